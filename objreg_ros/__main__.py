@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The executable `objreg`, and `python -m objreg_ros`: the process is the command's, from its first line to its last.
 
-Until the command is imported, and when it has ended, Ctrl-C ends the process as it does any other, without a word of
-Python's.
+Until the command is imported, and when it has ended, Ctrl-C ends the process as it does any other, without a
+traceback.
 """
 
 from __future__ import annotations

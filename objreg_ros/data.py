@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The words that pass between the rooms.
+"""The data types that pass between the nodes.
 
-Every word but `Rejected` checks shape and dtype of its arrays when it is made and raises ValueError with what it
+Every type but `Rejected` checks shape and dtype of its arrays when it is made and raises ValueError with what it
 expected and what it got; the arrays are read-only. Points are float32 metres in the camera's optical frame (x right,
 y down, z forward), poses float64, time integer nanoseconds, angles radians. A pose ``T_a_b`` maps points of b into a.
 A failure is None, a `Rejected` or an exception. It is never a pose.
@@ -25,15 +25,15 @@ Array = NDArray[Any]
 
 UNNAMED = "thing"  # the label of an object that the detector has no name for
 LEAST_VARIANCE = 1e-30  # m^2, rad^2: the information of less is no number that can be reckoned with
-JUMP_NS = 1_000_000_000  # stamps that go back so far are of a clock that began anew; by less, one message came late
+JUMP_NS = 1_000_000_000  # stamps that go back this far are of a clock that began anew; by less, one message came late
 MOVED = re.compile(r"moved (?P<label>.+) \[m\]")  # evidence: how far an object of the label went
 SURROGATE = re.compile("[\ud800-\udfff]")  # halves of a character, as broken JSON has them
-Word = TypeVar("Word")
+Data = TypeVar("Data")
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, eq_default=False, field_specifiers=(field,))
-def word(cls: type[Word]) -> type[Word]:
-    """The decorator of a word: a frozen dataclass with keyword fields and slots."""
+def word(cls: type[Data]) -> type[Data]:
+    """The decorator of a data type: a frozen dataclass with keyword fields and slots."""
     return dataclass(frozen=True, slots=True, kw_only=True, eq=False)(cls)
 
 
@@ -155,7 +155,7 @@ class Detections:
 
     ``xyxy (N, 4) float32`` pixels of the full image, half open (x_max and y_max are outside); ``score (N,) float32``
     in 0..1; ``label`` N names; ``image_hw`` the image's height and width. An image with no object gives N = 0.
-    ``ids`` are what the detector, or a tracker in it, calls each of them; none where it does not. ``instances (H, W)
+    ``ids`` are what the detector, or a tracker in it, calls each of them; empty where it gives none. ``instances (H, W)
     uint16`` shows the same field of view in any size: k + 1 where the k-th object is, 0 where none; None for no masks.
     """
 
@@ -225,7 +225,7 @@ class PointCloud:
 
 @word
 class DepthImage:
-    """What every depth source becomes at the segmenter's door.
+    """What the segmenter makes of every depth source.
 
     ``depth (H, W) float32`` metres along the optical axis, 0 to `limits.MOST_DEPTH`, 0 where there is none (never NaN);
     ``rgb (H, W, 3) uint8`` registered to it, or None; ``intrinsics`` of the same size; ``shown (H, W) bool`` to which
@@ -270,7 +270,7 @@ class ObjectCloud:
     ``label`` is `UNNAMED` where the detector has no name for it;
     ``rgb (M, 3) uint8`` or None; ``flags (M,) uint16`` of `PointFlag`; ``density`` measured points per square metre of
     surface; ``instance`` counts the objects of the frame from 1 (0 is the support surface); ``detection_id`` is what
-    the detector calls it, empty where it does not.
+    the detector calls it, empty where it gives none.
     """
 
     label: str
@@ -341,13 +341,13 @@ class View:
 
 @word
 class Frame:
-    """Everything that the segmenter says of one moment.
+    """The segmenter's output for one stamp.
 
     ``objects`` with instance >= 1; ``support`` the points of the surfaces they stand on (instance 0) or None;
-    ``gravity (3,) float64`` of length 1, the way things fall in the camera frame, or None; ``gravity_confidence`` 0..1;
-    ``T_odom_camera`` the odometry's pose of the camera or None; ``robot`` who carries the camera, empty where there is
-    but one; ``doubt`` why the camera is not what it says, empty where nothing speaks against it; ``proven`` whether
-    enough of the stream was seen for that.
+    ``gravity (3,) float64`` of length 1, the direction of gravity in the camera frame, or None;
+    ``gravity_confidence`` 0..1; ``T_odom_camera`` the odometry's pose of the camera or None; ``robot`` who carries the
+    camera, empty where there is but one; ``doubt`` why the camera is not what it says, empty where nothing speaks
+    against it; ``proven`` whether enough of the stream was seen for that.
     """
 
     objects: tuple[ObjectCloud, ...]
@@ -399,7 +399,7 @@ class ImuSample:
 
 @word
 class FeltGravity:
-    """The way things fall at ``stamp_ns``, as something other than the picture tells it, in the axes of ``frame_id``.
+    """The direction of gravity at ``stamp_ns`` from a source other than the picture, in the axes of ``frame_id``.
 
     ``gravity (3,) float64`` of length 1; ``gravity_sigma_deg`` the standard deviation of either tilt.
     """
@@ -485,11 +485,11 @@ class Observation:
 
 
 Moments = tuple[str, int, str, int]  # of a closure: camera and stamp in ns of *from*, and of *to*
-Robots = tuple[str, str]  # of a closure: that of *from* and that of *to*, empty where it is not told
+Robots = tuple[str, str]  # of a closure: that of *from* and that of *to*, empty where it is not known
 
 
 def may_be_same(robots: Robots, others: Robots) -> bool:
-    """Whether the robots of two closures are the same, as far as both are told."""
+    """Whether the robots of two closures are the same, as far as both are known."""
     return all(a == b or not a or not b for a, b in zip(robots, others, strict=True))
 
 
@@ -505,13 +505,13 @@ def robot_of(frame_id: str, robots: Sequence[str]) -> str:
 
 @word
 class LoopClosure:
-    """Two moments that saw the same place: ``T_from_to`` maps points of the camera at *to* into the camera at *from*.
+    """Two keyframes that saw the same place: ``T_from_to`` maps points of the camera at *to* into the camera at *from*.
 
     ``covariance (6, 6) float64`` in ROS order [tx ty tz rx ry rz], of the pose in the *from* frame; ``labels`` of the
     objects that closed it; ``matches`` those with their landmarks; ``evidence`` named numbers of the verification;
     ``from_frame_id`` and ``to_frame_id`` the names of the two cameras, which may be two of one robot; ``from_session``
-    and ``to_session`` the runs of odometry that the moments belong to, None where it is not known; ``from_robot`` and
-    ``to_robot`` the names of the robots whose runs these are, empty where it is not told.
+    and ``to_session`` the runs of odometry that the keyframes belong to, None where it is not known; ``from_robot`` and
+    ``to_robot`` the names of the robots whose runs these are, empty where they are not known.
     """
 
     from_ns: int
@@ -539,17 +539,17 @@ class LoopClosure:
 
     @property
     def moments(self) -> Moments:
-        """What is the same of a closure on every topic and whenever it is told."""
+        """The identity of a closure: the same on every topic and at every publication."""
         return self.from_frame_id, self.from_ns, self.to_frame_id, self.to_ns
 
     @property
     def robots(self) -> Robots:
-        """Whose moments they are; the topic `constraints` does not tell it, objreg_msgs does."""
+        """The robots of the two keyframes; the topic `constraints` does not carry them, objreg_msgs does."""
         return self.from_robot, self.to_robot
 
     @property
     def moved(self) -> dict[str, float]:
-        """How far objects went that stood elsewhere before, m by label, as the evidence tells (see `MOVED`)."""
+        """How far objects went that stood elsewhere before, m by label, from the evidence (see `MOVED`)."""
         found = ((MOVED.fullmatch(name), metres) for name, metres in self.evidence.items())
         return {name["label"]: metres for name, metres in found if name}
 
@@ -559,9 +559,9 @@ class Relocalised:
     """Where the camera is in the map of an earlier ``session``: the frame that the poses of its keyframes are in.
 
     ``T_map_odom`` maps the odometry of now into it, ``T_map_camera`` is the camera of the frame at ``stamp_ns``;
-    ``covariance (6, 6) float64`` of that in ROS order, along the map's axes; ``closures`` that agree tell it, the
+    ``covariance (6, 6) float64`` of that in ROS order, along the map's axes; ``closures`` is how many agree on it, the
     newest to the keyframe of ``target_ns``: where that session's odometry has drifted, its map holds around there.
-    ``by_odometry`` says that odometry told both sessions' poses: the map is level then, else it is a camera's frame.
+    ``by_odometry`` says that odometry gave both sessions' poses: the map is level then, else it is a camera's frame.
     """
 
     stamp_ns: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rigid motions and the pinhole camera, for more than one room.
+"""Rigid motions and the pinhole camera, for more than one package.
 
 A pose ``T_a_b`` is a (4, 4) float64 matrix that maps points of frame b into frame a: ``p_a = T_a_b @ p_b``.
 Tangent vectors follow ROS (REP-103): translation first, ``[tx ty tz rx ry rz]``, metres and radians.

@@ -28,8 +28,8 @@ MOST_SIDE = 32766  # px: OpenCV's remap counts in 16 bits
 LEAST_SHOWN = 0.25  # of the rectified picture; a wide lens that is shown whole still fills more
 OUTLINE = 5  # points of each side of a box: a bent side bulges between its corners
 STEPS, CLOSE_PX, PROBE = 30, 0.01, 1e-5  # of Newton's method; what it must reach; its step in a derivative
-FOLD_PIXELS = 1_000_000  # that are looked at for folds; of larger pictures every so many
-GRID = 65  # points of a row and of a column that tell how far pixels are moved
+FOLD_PIXELS = 1_000_000  # checked for folds at most; larger pictures are subsampled
+GRID = 65  # points of a row and of a column at which the displacement of pixels is measured
 ON_THE_WAY = (0.25, 0.5, 0.75, 1.0)  # from the axis to a ray, where the picture must not be folded yet
 NOWHERE = -1e4  # px: where a pixel is looked for that the raw picture does not show
 
@@ -130,7 +130,7 @@ class Lens:
         return np.clip(boxes, 0, limits)
 
     def rectify_uv(self, uv: Array) -> tuple[Array, Array]:
-        """Where raw pixels (N, 2) are in the rectified picture, and whether that is known (N,): Newton's method."""
+        """The rectified positions of raw pixels (N, 2), and whether they are known (N,): Newton's method."""
         wanted = np.asarray(uv, np.float64)
         K = _matrix(self.raw)
         ray = np.column_stack([(wanted - K[:2, 2]) / K[[0, 1], [0, 1]], np.ones(len(wanted))]) @ self._turn.T

@@ -71,9 +71,9 @@ class Camera:
 
     def intrinsics(self, height: int, width: int) -> Intrinsics:
         """The camera of a picture of this size; ValueError where it is said to be of another."""
-        told = self.height or height, self.width or width
-        if told != (height, width):
-            raise ValueError(f"camera: expected the picture's size {width} x {height}, got {told[1]} x {told[0]}")
+        given = self.height or height, self.width or width
+        if given != (height, width):
+            raise ValueError(f"camera: expected the picture's size {width} x {height}, got {given[1]} x {given[0]}")
         return Intrinsics(fx=self.fx, fy=self.fy, cx=self.cx, cy=self.cy, width=width, height=height)
 
 
@@ -145,10 +145,10 @@ def register_keyframes(
     method: Method | str | None = None,
     params: RegistrarParams | None = None,
 ) -> Registration:
-    """As `register`, of two short lists of frames (`segment`), each seen within a moment and fused into a keyframe.
+    """As `register`, of two short lists of frames (`segment`), each seen within a short time and fused into a keyframe.
 
-    More than one frame in a list needs ``T_odom_camera`` of each, which must hold within the list: nothing is taken
-    from it about the way between the two. ``T_1_2`` maps points of the camera of the first frame of ``frames_2`` into
+    More than one frame in a list needs ``T_odom_camera`` of each, which must hold within the list: it says nothing
+    about the motion between the two. ``T_1_2`` maps points of the camera of the first frame of ``frames_2`` into
     that of the first frame of ``frames_1``. ValueError for an empty list, and for frames without odometry.
     """
     params = params or RegistrarParams()

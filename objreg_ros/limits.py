@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How large a thing may be that a message, a file or a word tells of. Nothing that a robot does comes near.
+"""The largest values that a message, a file or a data type may hold. No robot comes near them.
 
 What is read is held against these before memory is taken for it, so whoever sends more is refused and nothing ends.
 """
@@ -28,13 +28,13 @@ OWN_VIEW_PIXELS = 160_000  # to which a larger view is brought: that of a Full H
 MOST_OBJECT_POINTS = 1_000_000  # of the objects of one frame, which have some 50 000
 MOST_PACKED_KEYFRAME = 1_000_000  # bytes of a keyframe that is sent, which has some 70 000
 MOST_UNPACKED_KEYFRAME = 4_000_000  # bytes that it unpacks to: about one for each of its numbers
-MOST_SUMMARY = 100_000  # bytes of what is told of a keyframe to others, which has some 1000
+MOST_SUMMARY = 100_000  # bytes of a keyframe's summary for other robots, which has some 1000
 MOST_UNPACKED_SUMMARY = 400_000  # bytes that it unpacks to
 
 LEAST_FOCAL_LENGTH, MOST_FOCAL_LENGTH = 1e-3, 1e6  # px: beyond them rays do not fit into float32
 LEAST_RANGE = 1e-3  # m along the optical axis: what is nearer has no place in the picture
-MOST_RANGE = 1000.0  # m from a camera: float32 still tells a tenth of a millimetre there
-MOST_DEPTH = 1e5  # m of a depth image: millimetres that come as metres are told of, and so have to come in
+MOST_RANGE = 1000.0  # m from a camera: float32 still resolves a tenth of a millimetre there
+MOST_DEPTH = 1e5  # m of a depth image: millimetres labelled as metres must pass, so that they can be reported
 MOST_NORMAL = 2.0  # of a part of a normal, whose length is about 1
 MOST_DENSITY = 1e12  # points per square metre
 MOST_DISTANCE = 1e8  # m from the origin of a pose: the earth is smaller

@@ -50,29 +50,29 @@ from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.sensor.sensor_estimate import Lag, SensorEstimate
 from objreg_ros.truth import Truth, summarise
 
-Word = TypeVar("Word")
+Value = TypeVar("Value")
 
 LEFT_OUT = f"depth_{Drop.SURPLUS.value}"
 ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames
 
 
 class Detects(Protocol):
-    """What the first room does."""
+    """The interface of the detector."""
 
     def detect(self, image: ColourImage) -> Detections: ...
 
 
 class Segments(Protocol):
-    """What the second room does."""
+    """The interface of the segmenter."""
 
     @property
     def choice(self) -> GravityChoice:
-        """Who told gravity in the last frame."""
+        """The source of gravity in the last frame."""
         ...
 
     @property
     def sensor(self) -> SensorEstimate:
-        """What the frames told of their sensor."""
+        """What the frames showed of their sensor."""
         ...
 
     def segment(
@@ -86,7 +86,7 @@ class Segments(Protocol):
 
 
 class Outcome(Protocol):
-    """What the third room says of a frame."""
+    """The registrar's result for a frame."""
 
     @property
     def closures(self) -> tuple[LoopClosure, ...]: ...
@@ -96,7 +96,7 @@ class Outcome(Protocol):
 
 
 class Registers(Protocol):
-    """What the third room does."""
+    """The interface of the registrar."""
 
     @property
     def tracked(self) -> tuple[int, Array] | None:
@@ -121,7 +121,7 @@ class Rooms:
 def build_rooms(
     detector: DetectorParams, segmenter: SegmenterParams, registrar: RegistrarParams, detects: Detects | None = None
 ) -> tuple[Rooms, Callable[[], None]]:
-    """The rooms by their parameters, and what closes them. OSError and ValueError as the rooms raise them.
+    """The stages by their parameters, and what closes them. OSError and ValueError as the stages raise them.
 
     ``detects`` takes the place of the detector: what remembers pictures that it has seen before, say.
     """
@@ -146,7 +146,7 @@ class Timing:
 
     With ``level_odom`` the segmenter takes gravity from the odometry, and ``T_level_camera`` is its T_base_camera.
     ``max_rate`` is the detector's; 0, as it is here, is every picture. ``T_camera_imu`` is the segmenter's.
-    ``frames`` is asked for each of these that is None, and takes in what /tf says on the way.
+    ``frames`` is asked for each of these that is None, and takes in what /tf says during the run.
     """
 
     slop_ns: int = 20_000_000
@@ -163,23 +163,23 @@ class Timing:
 
 @dataclass
 class Run:
-    """What came out of a run."""
+    """The results of a run."""
 
     frames: int = 0
     detections: int = 0
     objects: int = 0
     lens: str = ""  # what was assumed of it; empty where no camera_info came
     registered: str = ""  # how depth was brought into the picture of colour; empty where it came so
-    findings: tuple[Finding, ...] = ()  # what of the stream is not as it says
+    findings: tuple[Finding, ...] = ()  # where the stream is not as it says
     measured_mount: Array | None = None  # T_body_camera, where nothing says it and it was measured
-    mount: str = ""  # what was assumed of how the camera sits on the body of the odometry; empty where it is told
+    mount: str = ""  # what was assumed of how the camera sits on the body of the odometry; empty where it is known
     closures: list[LoopClosure] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
     refusals: list[Rejected] = field(default_factory=list)
     glimpses: list[dict[str, Any]] = field(default_factory=list)  # `glimpse` of every frame
     dropped: Counter[str] = field(default_factory=Counter)  # ``malformed_<input>``, ``depth_<why>``, ``frame_<why>``
     complaints: dict[str, str] = field(default_factory=dict)  # the first of each kind
-    gravity_from: Counter[str] = field(default_factory=Counter)  # frames that went to the segmenter by who told it
+    gravity_from: Counter[str] = field(default_factory=Counter)  # segmented frames by their source of gravity
     depth_to_colour: str = ""  # how depth was turned against colour, in the end
     depth_noise: float | None = None  # in that of a Kinect v1; None where too little was measured
     depth_lag: Lag | None = None  # behind colour; None where it is not known well
@@ -212,7 +212,7 @@ class Run:
         }
 
     def gravity(self) -> dict[str, Any]:
-        """Who told gravity in how many frames, how far IMU and picture are apart, and what of the IMU told nothing."""
+        """Frames by source of gravity, how far IMU and picture are apart, and what of the IMU was not used."""
         apart = np.percentile(self.gravity_apart_deg, (50, 95)).round(2).tolist() if self.gravity_apart_deg else None
         return {
             "from": dict(sorted(self.gravity_from.items())),
@@ -222,7 +222,7 @@ class Run:
 
 
 def constraint_with_error(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
-    """A closure as JSON, with its true ``error``: None where the truth does not tell."""
+    """A closure as JSON, with its true ``error``: None where the truth is not known."""
     error = truth.error(closure)
     return {
         **constraint(closure),
@@ -233,8 +233,8 @@ def constraint_with_error(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
 def refusal(rejected: Rejected) -> dict[str, Any]:
     """A refused candidate as JSON."""
     pose = None if rejected.T_from_to is None else rejected.T_from_to.round(6).tolist()
-    moments = {"from_ns": rejected.from_ns, "to_ns": rejected.to_ns, "T_from_to": pose}
-    return {"reason": rejected.reason.value, **moments, "detail": rejected.detail}
+    stamps = {"from_ns": rejected.from_ns, "to_ns": rejected.to_ns, "T_from_to": pose}
+    return {"reason": rejected.reason.value, **stamps, "detail": rejected.detail}
 
 
 def refusal_with_evidence(rejected: Rejected) -> dict[str, Any]:
@@ -255,7 +255,7 @@ def glimpse(frame: Frame, labels: tuple[str, ...]) -> dict[str, Any]:
 
 
 def tracked(registrar: Registers) -> dict[str, Any] | None:
-    """Where the registrar's own tracking has the camera, as JSON: in which session, and ``T_session_camera``."""
+    """The camera's pose by the registrar's own tracking, as JSON: the session, and ``T_session_camera``."""
     if registrar.tracked is None:
         return None
     session, T_session_camera = registrar.tracked
@@ -295,7 +295,7 @@ class Line:
         self._level_mount = Mount(timing.T_level_camera, timing.frames)
         self._odom_topic = inputs.odom or ""
         self.run.imu_passed_over = self._imu.counts
-        self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
+        self._labels: dict[int, tuple[str, ...]] = {}  # detected in the frames that are in progress
         self._views = Synchroniser(self._streams(), self._unmatched)
         expected = inputs.odom is not None
         odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH, enclosing=True, expected=expected)
@@ -362,7 +362,7 @@ class Line:
                 self._feed(name, stamp_ns, felt)
 
     def _take_tf(self, message: Any) -> None:
-        """What /tf says; frames wait until the joints that carry the camera are known."""
+        """Take /tf in; frames wait until the joints that carry the camera are known."""
         self._kept("tf", partial(self._timing.frames.receive_moving, message))
         reached_ns = self._mount.reached_ns
         if reached_ns is not None:
@@ -432,8 +432,8 @@ class Line:
         return frame, detections
 
     def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:
-        words = match.payloads.get("imu")
-        return self._imu.in_camera(from_msg.gravity_at(match.stamp_ns, words), camera_frame) if words else None
+        samples = match.payloads.get("imu")
+        return self._imu.in_camera(from_msg.gravity_at(match.stamp_ns, samples), camera_frame) if samples else None
 
     def _note_gravity(self, choice: GravityChoice) -> None:
         self.run.gravity_from[choice.source] += 1
@@ -492,8 +492,8 @@ class Line:
         if name in ("depth", "frame"):
             self.run.dropped[f"{name}_{why}"] += 1
 
-    def _kept(self, name: str, work: Callable[[], Word]) -> Word | None:
-        """What the work gives; None, counted as dropped, where a message breaks its contract."""
+    def _kept(self, name: str, work: Callable[[], Value]) -> Value | None:
+        """The result of the work; None, counted as dropped, where a message breaks its contract."""
         try:
             return work()
         except ValueError as error:
@@ -517,7 +517,7 @@ def run_offline(
     on_frame: Callable[[int], None] = lambda frames: None,
     recorded: RecordedDetections | None = None,
 ) -> Run:
-    """Drive the rooms with a recording's records, to their end or to ``max_frames``; what came out.
+    """Drive the stages with a recording's records, to their end or to ``max_frames``; what came out.
 
     ``on_frame`` receives how many frames are through, those that were left out among them. ``recorded`` are detections
     that take the place of the detector's.

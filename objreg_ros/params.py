@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A parameter is declared once, as a field of its room's frozen dataclass:
+"""A parameter is declared once, as a field of its node's frozen dataclass:
 
     @dataclass(frozen=True)
     class DetectorParams(Params):
         threshold: float = param(0.5, "least score of a detection", ge=0.0, le=1.0)
 
 From that line come the ROS declaration with description and range, config/objreg.yaml, docs/parameters.md, and the same
-refusal in a node, a test and an offline run. This file knows neither ROS nor any room.
+refusal in a node, a test and an offline run. This file knows neither ROS nor any node.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Declaration:
     le: float | None = None
     choices: tuple[str, ...] = ()
     live: bool = False
-    counts: tuple[int, ...] = ()  # how long a list may be; empty: as long as it likes
+    counts: tuple[int, ...] = ()  # how long a list may be; empty: any length
     or_auto: bool = False  # whether "auto" stands for an empty list
     at_start: bool = False  # whether it is set at the start alone, in a managed node too
 
@@ -71,7 +71,7 @@ class Declaration:
 
     @property
     def range_text(self) -> str:
-        """The range or the choices in words; empty if anything goes."""
+        """The range or the choices as text; empty if anything goes."""
         if self.choices:
             return " | ".join(self.choices)
         if self.ge is not None and self.le is not None:
@@ -104,7 +104,7 @@ def param(
 
 @dataclasses.dataclass(frozen=True)
 class Params:
-    """The base of every room's parameters; checks all values when it is made.
+    """The base of every node's parameters; checks all values when it is made.
 
     ``DROPPED`` names those that the last release had, with what took their place.
     """

@@ -81,14 +81,14 @@ class _ClosesNothing:
 def rehearse(
     source: Recording, inputs: Inputs, frames: int = FRAMES, on_frame: Callable[[int], None] = lambda frames: None
 ) -> Run:
-    """What comes of the first ``frames`` of a recording. ``on_frame`` as in `run_offline`."""
+    """The run of the first ``frames`` of a recording. ``on_frame`` as in `run_offline`."""
     rooms = Rooms(SeesNothing(), _CutsNothing(), _ClosesNothing(), organise)
     timing = Timing(frames=frame_tree(source, camera_frame(source, inputs)))
     return run_offline(_beginning(source, inputs, frames), rooms, inputs, timing, on_frame=on_frame)
 
 
 def _beginning(source: Recording, inputs: Inputs, frames: int) -> Iterator[Record]:
-    """The records that the graph takes, until so many of depth have come."""
+    """The records that the graph takes, until ``frames`` of depth have come."""
     depth = inputs.depth or inputs.points
     for record in source.records({*inputs.chosen().values(), *moving_topics(source)}):
         yield record

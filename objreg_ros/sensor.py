@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is assumed of the sensor, in one place: how depth errs, and gravity. Every room may import it.
+"""The assumptions on the sensor, in one place: how depth errs, and gravity. Every package may import it.
 
-The numbers are those of a structured-light camera (Kinect v1). Where two of them speak of the same thing they differ,
-since each room was fitted with its own. What another camera errs by as much again is measured in every view
+The numbers are those of a structured-light camera (Kinect v1). Where two of them describe one quantity they differ,
+since each package was fitted with its own. What another camera errs by as much again is measured in every view
 (`depth_noise`), and the registration's tolerances grow with it (`depth_tolerance`): nobody has to name a camera.
 """
 
@@ -117,14 +117,14 @@ def gravity_confidence(sigma_deg: float) -> float:
     return float(np.interp(-np.log(max(sigma_deg, 1e-9)), -np.log(SIGMA_DEG), CONFIDENCE))
 
 
-ONE_VIEW = 0.02  # weight of the gravity that a single view tells, beside 1 of many from around
-MANY_VIEWS_DEG = 0.5  # standard deviation of what those tell
+ONE_VIEW = 0.02  # weight of the gravity of a single view, beside 1 of many from around
+MANY_VIEWS_DEG = 0.5  # standard deviation of the gravity of those
 
 
 def session_gravity_sigma_deg(weight: float) -> float:
     """The standard deviation in degrees of either tilt of a keyframe's gravity, by its weight 0..1.
 
-    Many views have told it, carried by odometry (`keyframes/gravity_filter.py`), or this one alone: then its weight is
+    It is of many views, carried by odometry (`keyframes/gravity_filter.py`), or of this one alone: then its weight is
     at most `ONE_VIEW`, which falls with the third power of the view's confidence.
     """
     if weight <= ONE_VIEW:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where config/, launch/ and models/ are: in a checkout, in a colcon workspace or beside a pip installation."""
+"""The places of config/, launch/ and models/: in a checkout, in a colcon workspace or beside a pip installation."""
 
 from __future__ import annotations
 

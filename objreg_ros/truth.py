@@ -34,19 +34,19 @@ class Truth:
     """
 
     def __init__(self, poses: Iterable[tuple[int, Array]], notes: Sequence[str] = ()) -> None:
-        told = list(poses)
-        kept = _in_course([stamp_ns for stamp_ns, _ in told])
-        self.stamps_ns: list[int] = [told[i][0] for i in kept]
-        self.poses: list[Array] = [told[i][1] for i in kept]
-        self.notes = (*notes, *_out_of_course(len(told) - len(kept), len(told)))
+        given = list(poses)
+        kept = _in_course([stamp_ns for stamp_ns, _ in given])
+        self.stamps_ns: list[int] = [given[i][0] for i in kept]
+        self.poses: list[Array] = [given[i][1] for i in kept]
+        self.notes = (*notes, *_out_of_course(len(given) - len(kept), len(given)))
 
     @classmethod
     def of(cls, recording: Recording, topic: str | None) -> Truth:
         """The truth on a topic of a recording; without poses if ``topic`` is None. What is no pose is passed over."""
-        told = [pose_of(record) for record in (recording.records([topic]) if topic else ())]
-        words = [word for word in told if word is not None]
-        notes = passed_over(len(told) - len(words), len(told), f"the ground truth {topic}")
-        return cls(((word.stamp_ns, word.T_odom_body) for word in words), notes)
+        given = [pose_of(record) for record in (recording.records([topic]) if topic else ())]
+        poses = [odometry for odometry in given if odometry is not None]
+        notes = passed_over(len(given) - len(poses), len(given), f"the ground truth {topic}")
+        return cls(((odometry.stamp_ns, odometry.T_odom_body) for odometry in poses), notes)
 
     @property
     def length(self) -> float:
@@ -55,7 +55,7 @@ class Truth:
         return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
 
     def at(self, stamp_ns: int) -> Array | None:
-        """``T_world_camera`` at a moment; None before the first, after the last and within a gap."""
+        """``T_world_camera`` at a time; None before the first, after the last and within a gap."""
         after = bisect_left(self.stamps_ns, stamp_ns)
         if after < len(self.stamps_ns) and self.stamps_ns[after] == stamp_ns:
             return self.poses[after]
@@ -67,17 +67,17 @@ class Truth:
         return interpolate(self.poses[after - 1], self.poses[after], (stamp_ns - start) / (end - start))
 
     def between(self, from_ns: int, to_ns: int) -> Array | None:
-        """The true ``T_from_to`` of two moments; None where the truth does not tell."""
+        """The true ``T_from_to`` between two times; None where the truth is not known."""
         T_world_from, T_world_to = self.at(from_ns), self.at(to_ns)
         return None if T_world_from is None or T_world_to is None else inverse(T_world_from) @ T_world_to
 
     def error(self, closure: LoopClosure | Rejected) -> Error | None:
-        """(degrees, centimetres) between a pose and the truth; None where the truth does not tell or there is none."""
+        """(degrees, centimetres) between a pose and the truth; None where there is no pose, or no truth for it."""
         T_from_to = self.between(closure.from_ns, closure.to_ns)
         return None if T_from_to is None or closure.T_from_to is None else pose_error(closure.T_from_to, T_from_to)
 
     def errors(self, closures: Iterable[LoopClosure]) -> list[Error]:
-        """The error of every closure that the truth tells of."""
+        """The error of every closure whose truth is known."""
         return [error for closure in closures if (error := self.error(closure)) is not None]
 
 
@@ -91,7 +91,7 @@ class Truths:
         self.of_robots = dict(of_robots)
 
     def at(self, robot: str, stamp_ns: int) -> Array | None:
-        """``T_world_camera`` of a robot at a moment; None where its truth does not tell."""
+        """``T_world_camera`` of a robot at a time; None where its truth is not known."""
         if robot not in self.of_robots:
             raise ValueError(
                 f"robot: expected one of {', '.join(self.of_robots)}, got {robot!r}; name it in the closure"
@@ -99,7 +99,7 @@ class Truths:
         return self.of_robots[robot].at(stamp_ns)
 
     def error(self, closure: LoopClosure | Rejected) -> Error | None:
-        """(degrees, centimetres) between a pose and the truth; None where the truth does not tell or there is none."""
+        """(degrees, centimetres) between a pose and the truth; None where there is no pose, or no truth for it."""
         T_world_from = self.at(closure.from_robot, closure.from_ns)
         T_world_to = self.at(closure.to_robot, closure.to_ns)
         if T_world_from is None or T_world_to is None or closure.T_from_to is None:
@@ -107,12 +107,12 @@ class Truths:
         return pose_error(closure.T_from_to, inverse(T_world_from) @ T_world_to)
 
     def errors(self, closures: Iterable[LoopClosure]) -> list[Error]:
-        """The error of every closure that the truth tells of."""
+        """The error of every closure whose truth is known."""
         return [error for closure in closures if (error := self.error(closure)) is not None]
 
 
 def _in_course(stamps_ns: Sequence[int]) -> list[int]:
-    """Which of the stamps increase, without one that is `JUMP_NS` ahead of the two behind it and parts their course."""
+    """The indices of increasing stamps, without one that is `JUMP_NS` ahead of the two behind it and parts them."""
     kept: list[int] = []
     for i, stamp_ns in enumerate(stamps_ns):
         behind, last_ns = stamps_ns[i + 1 : i + 3], stamps_ns[kept[-1]] if kept else None
@@ -123,8 +123,8 @@ def _in_course(stamps_ns: Sequence[int]) -> list[int]:
 
 
 def _out_of_course(count: int, of: int) -> list[str]:
-    told = f"{count} of {of} poses of the ground truth are left out: their stamps do not increase, or leap ahead alone"
-    return [told] if count else []
+    note = f"{count} of {of} poses of the ground truth are left out: their stamps do not increase, or leap ahead alone"
+    return [note] if count else []
 
 
 def within(error: Error, bound: Error) -> bool:

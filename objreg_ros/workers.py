@@ -48,8 +48,8 @@ def require_dask() -> ModuleType:
     try:
         import distributed
     except ModuleNotFoundError as absent:
-        told = "expected Dask's distributed, found none; pip install 'objreg_ros[batch]' brings it"
-        raise ValueError(told) from absent
+        problem = "expected Dask's distributed, found none; pip install 'objreg_ros[batch]' brings it"
+        raise ValueError(problem) from absent
     return distributed
 
 
@@ -74,10 +74,10 @@ def spread(
         futures = client.map(partial(_alone, work), items, pure=False)
         item_of = {future.key: item for future, item in zip(futures, items, strict=True)}
         for future in require_dask().as_completed(futures, loop=client.loop):
-            yield _told(item_of[future.key], future)
+            yield _done(item_of[future.key], future)
 
 
-def _told(item: Item, future: Any) -> Done[Item, Any]:
+def _done(item: Item, future: Any) -> Done[Item, Any]:
     distributed = require_dask()
     try:
         return future.result()
@@ -110,8 +110,8 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
             client = stack.enter_context(distributed.Client(place, timeout=PATIENCE_S, set_as_default=False))
             client.wait_for_workers(1, timeout=PATIENCE_S)
         except (OSError, ValueError, TimeoutError) as error:
-            told = f"{scheduler or 'the local cluster'}: expected a Dask scheduler with workers, got none: {error}"
-            raise OSError(f"{told}; start them with `dask scheduler` and `dask worker`") from error
+            problem = f"{scheduler or 'the local cluster'}: expected a Dask scheduler with workers, got none: {error}"
+            raise OSError(f"{problem}; start them with `dask scheduler` and `dask worker`") from error
         yield client
 
 

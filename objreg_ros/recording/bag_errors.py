@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of a bag that cannot be read, and the remedy that fits its file."""
+"""The error message of a bag that cannot be read, with the remedy that fits its file."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ CHECK = "check the copy, or record it again"
 
 @contextmanager
 def broken_means_value_error(path: Path, opened: bool = False) -> Iterator[None]:
-    """What a library raises at the bytes of a bag becomes a ValueError that says expected, got and a remedy.
+    """Turn an error of a library on the bytes of a bag into a ValueError that says expected, got and a remedy.
 
     What fails once it is ``opened`` is damaged within, even where its records follow each other.
     """
@@ -93,7 +93,7 @@ def says_broken(error: Exception) -> bool:
 
 
 def advice(path: Path, opened: bool = False) -> str:
-    """What to do with a bag file, or with a folder of them, that cannot be read: by what is in it."""
+    """The remedy for a bag file, or a folder of them, that cannot be read, by its content."""
     if path.is_dir():
         return _advice_of_folder(path, opened)
     begins = _first_bytes(path)
@@ -140,7 +140,7 @@ def _skip_record(file: BinaryIO, end: int) -> int | None:
 
 
 def _profile(path: Path) -> str:
-    """What an mcap file says of who wrote it, in words; nothing where that is ROS 2."""
+    """The writer of an mcap file as text, by its profile; empty where that is ROS 2."""
     head = _first_bytes(path)[8:]
     length = int.from_bytes(head[9:13], "little") if head[:1] == bytes([HEADER]) else 0
     profile = head[13 : 13 + length].decode(errors="replace")

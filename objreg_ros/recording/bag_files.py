@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which files of a folder are one recording, and a reader over them: with metadata.yaml, or without.
+"""The files of a folder that are one recording, and a reader over them: with metadata.yaml, or without.
 
 A crash, a full disk or a hand leave bags whose metadata.yaml is missing, empty or names files that are gone. The files
 themselves say all that is needed, so they are read, and what was done is said.
@@ -40,7 +40,7 @@ class OpenBag:
     files: list[Path]
     notes: list[str] = field(default_factory=list)
     kept: ExitStack = field(default_factory=ExitStack)
-    """What is let go of when the bag is closed: files that were unpacked."""
+    """The resources to release when the bag is closed: files that were unpacked."""
 
 
 def is_bag(file: Path) -> bool:

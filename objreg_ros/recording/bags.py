@@ -57,8 +57,8 @@ class BagRecording(Recording):
         self._connections, notes = _one_type_each(self._reader.connections)
         self.notes = [*bag.notes, *notes]
         self.topics = _topics(self._connections)
-        told = {kind: misfit(kind, self._types()) for kind in READ if kind in self._types().fielddefs}
-        self._misfits = {kind: why for kind, why in told.items() if why}
+        found = {kind: misfit(kind, self._types()) for kind in READ if kind in self._types().fielddefs}
+        self._misfits = {kind: why for kind, why in found.items() if why}
         spans = any(topic.count for topic in self.topics.values())
         self.start_ns, self.end_ns = (self._reader.start_time, self._reader.end_time) if spans else (0, 0)
         if not -END_OF_TIME_NS <= self.start_ns <= self.end_ns <= END_OF_TIME_NS:
@@ -103,7 +103,7 @@ class BagRecording(Recording):
         self._kept.close()
 
     def _unpacked(self, raw: bytes) -> bytes:
-        """The bytes of a message that was packed by itself, of which only metadata.yaml tells; CDR begins with 0."""
+        """The bytes of a message that was packed by itself, which only metadata.yaml states; CDR begins with 0."""
         return rosbag2.zstd.decompress(raw) if self._reader.is2 and raw[:4] == ZSTD_MAGIC else raw
 
     def _odd_message(self, got: str) -> ValueError:

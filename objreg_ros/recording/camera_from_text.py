@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording with the camera that its user tells, in place of every camera_info that it holds.
+"""A recording with the camera that its user gives, in place of every camera_info that it holds.
 
 So the graph, a replay of it and the pages about it take the camera as they take any camera_info.
 """
@@ -28,7 +28,7 @@ class CameraFromText(Recording):
         self._of, self._camera, self._frame_id = of, camera, frame_id
         self.path, self.kind, self.of_pictures = of.path, of.kind, of.of_pictures
         others = sorted(of.topics.keys() - _without_cameras(of).keys())
-        self.notes = [*of.notes, *notes, *([f"not used, as a camera is told: {', '.join(others)}"] if others else [])]
+        self.notes = [*of.notes, *notes, *([f"not used, as a camera is given: {', '.join(others)}"] if others else [])]
         self.start_ns, self.end_ns = of.start_ns, of.end_ns
         self.topics = {**_without_cameras(of), TOLD: Topic(TOLD, CAMERA_INFO, 1)}
 
@@ -38,9 +38,9 @@ class CameraFromText(Recording):
         """See `Recording.records`."""
         wanted = set(self.topics if topics is None else topics)
         within = (start_ns is None or start_ns <= self.start_ns) and (end_ns is None or end_ns > self.start_ns)
-        told = [Record.made(TOLD, CAMERA_INFO, self.start_ns, self._message)] if within and TOLD in wanted else []
+        camera = [Record.made(TOLD, CAMERA_INFO, self.start_ns, self._message)] if within and TOLD in wanted else []
         others = (wanted & self.topics.keys()) - {TOLD}
-        return chain(told, self._of.records(others, start_ns, end_ns) if others else ())
+        return chain(camera, self._of.records(others, start_ns, end_ns) if others else ())
 
     def obstacles(self, shipped_only: bool = True) -> dict[str, str]:
         """See `Recording.obstacles`; the camera has none."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which topics are of one camera and of one robot, by their names and by the frames of their first messages.
+"""The topics of one camera and of one robot, by their names and by the frames of their first messages.
 
 A name is cut into the parts of its folders. What says the kind of a picture (rgb, depth, aligned, image) is left out;
 what remains names the camera: `/spot/depth_registered/frontleft/image` is spot, frontleft.
@@ -68,7 +68,7 @@ SAME, GENERICALLY_SAME, HALF, BY_FRAME = range(4)
 
 
 def camera_words(name: str) -> tuple[str, ...]:
-    """What names the camera in the name of a picture, a cloud or a camera_info."""
+    """The parts that name the camera in the topic of a picture, a cloud or a camera_info."""
     folders = TRANSPORT.sub("", name).strip("/").split("/")
     if folders[-1].lower() in ("camera_info", "points2"):
         folders.pop()

@@ -19,9 +19,9 @@ ODOM = "/drifting_odom"
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """How a good visual odometry errs: a random walk that grows with the way, and a scale that is a little off."""
+    """How a good visual odometry errs: a random walk that grows with the path, and a scale that is a little off."""
 
-    translation: float = 0.02  # m after 1 m, one sigma; grows with the root of the way
+    translation: float = 0.02  # m after 1 m, one sigma; grows with the root of the path length
     rotation_deg: float = 1.0  # degrees after 1 m, likewise
     rotation_share: float = 0.01  # of the angle that is turned
     scale: float = 0.01  # one sigma of the scale's error
@@ -45,10 +45,10 @@ class DriftingOdometry:
         return self._T_odom_last
 
     def _disturbed(self, motion: Array) -> Array:
-        drift, way = self._drift, float(np.linalg.norm(motion[:3, 3]))
-        turn = np.radians(drift.rotation_deg) * np.sqrt(way) + drift.rotation_share * rotation_angle(motion[:3, :3])
+        drift, length = self._drift, float(np.linalg.norm(motion[:3, 3]))
+        turn = np.radians(drift.rotation_deg) * np.sqrt(length) + drift.rotation_share * rotation_angle(motion[:3, :3])
         R = motion[:3, :3] @ rotation_from_vector(turn * self._random.standard_normal(3) / np.sqrt(3))
-        wander = drift.translation * np.sqrt(way) * self._random.standard_normal(3) / np.sqrt(3)
+        wander = drift.translation * np.sqrt(length) * self._random.standard_normal(3) / np.sqrt(3)
         return pose(R, self._scale * motion[:3, 3] + wander)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every folder of pictures is as a recording: colour, depth, a camera_info for each, and the poses beside them."""
+"""A folder of pictures as a recording: colour, depth, a camera_info for each, and the poses beside them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which topics of a recording go to which input of the graph: of one camera and one robot, all together.
+"""The topic of a recording for each input of the graph: of one camera and one robot, all together.
 
 Names are ranked by `topic_rules`, and what `--remap` names wins over everything.
 """
@@ -53,7 +53,7 @@ class Inputs:
 
     @property
     def missing(self) -> str:
-        """What keeps the graph from running, in words; empty if nothing does."""
+        """The obstacle that keeps the graph from running, as text; empty if none."""
         lacks = [] if self.image else ["a colour image"]
         if self.points is None and self.depth is None:
             lacks.append("points or a depth image")
@@ -62,7 +62,7 @@ class Inputs:
         return " and ".join(lacks)
 
     def wanted(self, source: str) -> str:
-        """What is missing, for a refusal that names the segmenter's ``source`` where it narrowed the choice."""
+        """The missing inputs, for a refusal that names the segmenter's ``source`` where it narrowed the choice."""
         return self.missing + ("" if source == "auto" else f" for segmenter.source={source}")
 
 
@@ -123,7 +123,7 @@ def alternatives(
 
 
 def depth_of_others(topics: Mapping[str, Topic], inputs: Inputs, frames: Mapping[str, str] | None = None) -> list[str]:
-    """What was recorded of depth, best first, where none of it is of the camera of colour; empty where some is."""
+    """The topics of depth, best first, where none is of the camera of colour; empty where one is."""
     if inputs.image is None or inputs.depth is not None or inputs.points is not None:
         return []
     free = _free(topics, inputs.chosen())
@@ -132,7 +132,7 @@ def depth_of_others(topics: Mapping[str, Topic], inputs: Inputs, frames: Mapping
 
 
 def _asked(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None, source: str) -> dict[str, str]:
-    """What is asked for by input; ValueError as `choose_inputs`."""
+    """The requested topics by input; ValueError as `choose_inputs`."""
     asked = _only(source, {_input_name(name): topic for name, topic in (remaps or {}).items()})
     _require_known(asked, topics)
     _require_types(asked, topics)
@@ -177,7 +177,7 @@ def _free(topics: Mapping[str, Topic], asked: Mapping[str, str]) -> list[Topic]:
 
 
 def _fall_back(found: dict[str, str | None], topics: Mapping[str, Topic], asked: Mapping[str, str], robot: str) -> None:
-    """Take what /tf tells, and poses as odometry, where no topic was found for an input that is not asked for."""
+    """Take what /tf states, and poses as odometry, where no topic was found for an input that is not asked for."""
     for name, topic in DERIVED.items():
         if name not in asked and not found[name] and topic in topics:
             found[name] = topic
@@ -187,7 +187,7 @@ def _fall_back(found: dict[str, str | None], topics: Mapping[str, Topic], asked:
 
 
 def _only(source: str, asked: Mapping[str, str]) -> dict[str, str]:
-    """What is asked for, and of the two kinds of depth only ``source``; ValueError where the other is asked for."""
+    """The requested topics, and of the two kinds of depth only ``source``; ValueError where the other is requested."""
     other = {"points": "depth", "depth": "points"}.get(source)
     if other is None:
         return dict(asked)

@@ -23,7 +23,7 @@ from objreg_ros.geometry import quaternion_from_rotation
 Array = NDArray[Any]
 
 MISSING = object()
-PADDING = "structure_needs_at_least_one_member"  # what some definitions say of a type without fields
+PADDING = "structure_needs_at_least_one_member"  # the field of a type without fields in some definitions
 READ = tuple(
     f"{package}/msg/{name}"
     for package, names in (
@@ -75,7 +75,7 @@ def modernise(old: Any) -> Any:
 
 
 def obstacle(msgtype: str, types: Typestore) -> str:
-    """Why messages of a type, as ``types`` know it, cannot be brought up to date, in words; empty if they can."""
+    """Why messages of a type, as ``types`` know it, cannot be brought up to date, as text; empty if they can."""
     modern = standard_types().fielddefs.get(msgtype)
     if modern is None:
         return f"ROS 2 does not ship {msgtype}"
@@ -91,7 +91,7 @@ def obstacle(msgtype: str, types: Typestore) -> str:
 
 
 def difference(msgtype: str, types: Typestore) -> str:
-    """Why the bytes of a type, as ``types`` know it, are not what ROS 2 Jazzy reads, in words; empty if they are."""
+    """Why the bytes of a type, as ``types`` know it, are not what ROS 2 Jazzy reads, as text; empty if they are."""
     ours = standard_types().fielddefs.get(msgtype)
     if ours is None:
         return f"ROS 2 does not ship {msgtype}"
@@ -104,16 +104,16 @@ def difference(msgtype: str, types: Typestore) -> str:
 
 
 def misfit(msgtype: str, types: Typestore) -> str:
-    """Why a message of a type, as ``types`` know it, cannot be read by our names, in words; empty if it can.
+    """Why a message of a type, as ``types`` know it, cannot be read by our names, as text; empty if it can.
 
     What ROS 1 says more, and in capitals, is no obstacle, nor is another type of number.
     """
     ours = standard_types().fielddefs[msgtype][1]
     there = dict(types.fielddefs.get(msgtype, (None, ours))[1])
     for name, field in ours:
-        told = there.get(name, there.get(name.upper()))
-        if told is None or _form(told) != _form(field):
-            return f"a definition of {msgtype} {'without' if told is None else 'with another'} {name}"
+        theirs = there.get(name, there.get(name.upper()))
+        if theirs is None or _form(theirs) != _form(field):
+            return f"a definition of {msgtype} {'without' if theirs is None else 'with another'} {name}"
         inner = _inner_type(field)
         if inner and (why := misfit(inner, types)):
             return why
@@ -121,7 +121,7 @@ def misfit(msgtype: str, types: Typestore) -> str:
 
 
 def _form(field: Any) -> Any:
-    """What a reader can do with a field: take it as a number, as text, as a message of a type or as a list of them."""
+    """The kind of a field for a reader: a number, text, a message of a type or a list of them."""
     kind, of = field
     if kind is Nodetype.BASE:
         return "text" if "string" in of[0] else "number"
@@ -187,12 +187,12 @@ def camera_info(camera: Intrinsics, stamp_ns: int, frame_id: str, distortion: Se
     """sensor_msgs/CameraInfo of a pinhole camera with plumb-bob distortion."""
     K = (camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0)
     P = (camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
-    told = Calibration(k=K, p=P, width=camera.width, height=camera.height, d=tuple(distortion))
-    return camera_info_from_text(told, stamp_ns, frame_id)
+    calibration = Calibration(k=K, p=P, width=camera.width, height=camera.height, d=tuple(distortion))
+    return camera_info_from_text(calibration, stamp_ns, frame_id)
 
 
 def camera_info_from_text(camera: Calibration, stamp_ns: int, frame_id: str) -> Any:
-    """sensor_msgs/CameraInfo of a camera that somebody names."""
+    """sensor_msgs/CameraInfo of a camera that the user names."""
     roi = message("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
     return message(
         "sensor_msgs/CameraInfo",

@@ -38,7 +38,7 @@ def is_moving(topic: str, msgtype: str) -> bool:
 
 
 def frame_tree(recording: Recording, *followed: str) -> FrameTree:
-    """What all of /tf_static says, and /tf at some moments of the recording; what does not decode is left out.
+    """The frames of all of /tf_static, and of /tf at some times of the recording, without messages that do not decode.
 
     Of what is above the frames ``followed`` it is then known what moves.
     """
@@ -54,7 +54,7 @@ def frame_tree(recording: Recording, *followed: str) -> FrameTree:
 
 
 def _glances(recording: Recording, topics: list[str]) -> Iterator[Record]:
-    """Records of some moments in order of time: all there are where these are few."""
+    """Records at some times, in order: all there are where these are few."""
     count = sum(recording.topics[topic].count for topic in topics)
     if count <= MOMENTS * LOOKED_AT:
         yield from recording.records(topics) if topics else ()
@@ -68,7 +68,7 @@ class Mounted(NamedTuple):
     """How the camera sits on the body of a recording's odometry.
 
     ``T_body_camera (4, 4)`` is None where a joint moves between them, or ``tie`` is None: nothing ties them. Both names
-    are empty where one is not told, and where the odometry is of the camera itself.
+    are empty where one is not known, and where the odometry is of the camera itself.
     """
 
     body: str
@@ -93,7 +93,7 @@ def camera_on_body(recording: Recording, inputs: Inputs) -> Mounted:
 
 
 def camera_frame(recording: Recording, inputs: Inputs) -> str:
-    """The frame of depth; empty if it tells none."""
+    """The frame of depth; empty if it names none."""
     return frame_of(first_readable(recording, inputs.depth or inputs.points))
 
 
@@ -111,5 +111,5 @@ def first_frames(recording: Recording) -> dict[str, str]:
 
 
 def frame_of(message: Any | None) -> str:
-    """The frame of a message; empty if it tells none."""
+    """The frame of a message; empty if it names none."""
     return "" if message is None else str(message.header.frame_id).lstrip("/")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The poses that a recording tells, and what stands in their place where there was none."""
+"""The poses that a recording holds, and what stands in their place where there was none."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def pose_of(record: Record) -> Odometry | None:
 
 def passed_over(count: int, of: int, what: str) -> list[str]:
     """A note for the user on ``count`` of ``of`` poses that were none; no note of 0."""
-    told = (
+    note = (
         f"{count} of {of} poses of {what} are none (NaN, a quaternion of length 0, or broken bytes) and are passed over"
     )
-    return [told] if count else []
+    return [note] if count else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every recording is: topics, and records in order of time that are decoded only when someone asks."""
+"""The interface of every recording: topics, and records in order of time that are decoded only on request."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rosbags.typesys.store import Typestore
 
 from objreg_ros.recording.messages import obstacle, serialise, standard_types
 
-VALID_NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")  # in ROS 2: no word begins with a digit
+VALID_NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")  # in ROS 2: no part begins with a digit
 LONGEST_NAME = 247
 
 
@@ -70,7 +70,7 @@ class Record:
 
 
 def misnamed(topic: str) -> str:
-    """Why ROS 2 cannot have a topic of this name, in words; empty if it can."""
+    """Why ROS 2 cannot have a topic of this name, as text; empty if it can."""
     fits = VALID_NAME.fullmatch(topic) is not None and len(topic) <= LONGEST_NAME
     return "" if fits else "no valid name in ROS 2"
 
@@ -125,7 +125,7 @@ class Recording(ABC):
         return {topic: depth for topic, depth in depths.items() if depth}
 
     def _obstacle(self, msgtype: str, shipped_only: bool) -> str:
-        """Why ROS 2 cannot have what is of a type, in words; empty if it can."""
+        """Why ROS 2 cannot have what is of a type, as text; empty if it can."""
         return obstacle(msgtype, self._types())
 
     def _types(self) -> Typestore:

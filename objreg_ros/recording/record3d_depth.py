@@ -54,7 +54,7 @@ def _unpacked(data: bytes, where: str) -> bytes:
 
 
 def _lzfse() -> Callable[[bytes], bytes] | None:
-    """What unpacks LZFSE; None where no library for it is installed."""
+    """The function that unpacks LZFSE; None where no library for it is installed."""
     for name in DECODERS:
         try:
             return import_module(name).decompress  # type: ignore[no-any-return]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What another detector found in the pictures of a recording, and recorded with them."""
+"""Detections of another detector that were recorded with the pictures."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class RecordedDetections:
 
 
 def recorded_detections(topics: Mapping[str, Topic]) -> list[RecordedDetections]:
-    """What a recording has: boxes before masks, then by name."""
+    """The topics of detections in a recording: boxes before masks, then by name."""
     there = [topics[name] for name in sorted(topics) if topics[name].count and not OWN.search(name)]
     found = [t.name for t in there if t.msgtype == BOXES]
     found += [t.name for t in there if t.msgtype == MASKS and fits(MASK, t.name)]
@@ -35,7 +35,7 @@ def recorded_detections(topics: Mapping[str, Topic]) -> list[RecordedDetections]
 
 
 def choose_detections(recording: Recording, name: str) -> RecordedDetections:
-    """The detections of a topic that somebody names.
+    """The detections of a topic that the user names.
 
     ValueError for one that is not there, holds something else, or whose first message cannot be read.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a replay publishes: which topics of a recording under which names, and from when to when."""
+"""The content of a replay: the topics of a recording, their names, and the first and last time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ AHEAD = 30  # records that are read before they are due
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What is played: ``names`` says under which name each topic goes out; times in seconds from the start."""
+    """The part to play: ``names`` gives the published name of each topic; times in seconds from the start."""
 
     names: dict[str, str]
     start: float = 0.0
@@ -114,7 +114,7 @@ def _read(
 
 
 def _put(ready: queue.Queue[Item], item: Item, stopped: threading.Event) -> bool:
-    """Put as soon as there is room; False if nobody wants it any more."""
+    """Put as soon as the queue has space; False once the reader has stopped."""
     while not stopped.is_set():
         try:
             ready.put(item, timeout=0.1)

@@ -31,7 +31,7 @@ from objreg_ros.recording.text import SETTINGS_BYTES, read_text
 from objreg_ros.recording.tum_camera import TumCamera, scaled
 from objreg_ros.recording.tum_lists import stamp_of
 
-ROUNDED = 1e-3  # what rounding to a few digits leaves a rotation off
+ROUNDED = 1e-3  # the error of a rotation that is rounded to a few digits
 COLOUR, DEPTH, POSES, CAMERA = "color", "depth", "pose", "intrinsic"
 
 

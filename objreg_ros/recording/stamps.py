@@ -17,7 +17,7 @@ from objreg_ros.recording.record import Recording
 
 SAMPLE = 60  # messages of colour and depth whose stamps are compared
 NEAR_NS = 20_000_000  # how far apart colour and depth may be for the nodes' default slop
-FAR_NS = 200_000_000  # in so long a camera moves on: to let such frames meet makes wrong objects
+FAR_NS = 200_000_000  # a camera moves on within this time: matching such frames makes wrong objects
 STEADY_NS = 6_000_000  # streams whose distance varies by less are a steady time apart
 FEW = 5  # stamps: of fewer nothing is steady
 

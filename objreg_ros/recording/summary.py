@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is in a recording, and what the graph would use of it."""
+"""The content of a recording, and the part that the graph would use."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def describe_topics(recording: Recording) -> list[Line]:
 
 
 def describe_lens(recording: Recording, inputs: Inputs, rectified: str = "auto") -> str:
-    """What the graph would assume of the lens of the camera; empty where there is no camera_info that can be read."""
+    """The lens that the graph would assume for the camera; empty where there is no camera_info that can be read."""
     message = first_readable(recording, inputs.camera_info)
     if message is None:
         return ""
@@ -81,8 +81,8 @@ def _camera(message: Any) -> str:
 
 
 def _pose(message: Any) -> str:
-    word = from_msg.odometry(message)
-    return f"{word.frame_id} → {word.child_frame_id or 'pose'}"
+    odometry = from_msg.odometry(message)
+    return f"{odometry.frame_id} → {odometry.child_frame_id or 'pose'}"
 
 
 def _imu(message: Any) -> str:
@@ -90,8 +90,8 @@ def _imu(message: Any) -> str:
     measured = {
         "acceleration": sample.acceleration, "turns": sample.angular_velocity, "orientation": sample.orientation,
     }  # fmt: skip
-    told = ", ".join(name for name, values in measured.items() if values is not None) or "nothing measured"
-    return f"{told}, {message.header.frame_id}"
+    names = ", ".join(name for name, values in measured.items() if values is not None) or "nothing measured"
+    return f"{names}, {message.header.frame_id}"
 
 
 def _boxes(message: Any) -> str:

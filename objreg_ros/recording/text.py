@@ -23,11 +23,11 @@ KINDS = (
 
 def require_regular(file: Path) -> int:
     """The size of a file in bytes. OSError if there is none; ValueError for what is no file, which may never end."""
-    told = file.stat()
-    if not stat.S_ISREG(told.st_mode):
-        got = next((kind for holds, kind in KINDS if holds(told.st_mode)), "something else")
+    status = file.stat()
+    if not stat.S_ISREG(status.st_mode):
+        got = next((kind for holds, kind in KINDS if holds(status.st_mode)), "something else")
         raise ValueError(f"{file}: expected a regular file, got {got}; put a copy of the file there")
-    return told.st_size
+    return status.st_size
 
 
 def read_text(file: Path, most_bytes: int = TEXT_BYTES) -> str:

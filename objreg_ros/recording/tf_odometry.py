@@ -21,7 +21,7 @@ from objreg_ros.recording.inputs import TF_ODOM, TF_TRUTH, Inputs, choose_inputs
 from objreg_ros.recording.mounts import first_frames, first_readable, frame_of, frame_tree, moving_topics
 from objreg_ros.recording.record import Record, Recording, Topic
 
-UNCERTAIN = np.eye(6)  # /tf tells no covariance
+UNCERTAIN = np.eye(6)  # /tf has no covariance
 
 
 class WithTransforms(Recording):
@@ -45,7 +45,7 @@ class WithTransforms(Recording):
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
     ) -> Iterator[Record]:
-        """See `Recording.records`; what is made comes behind the /tf that tells it."""
+        """See `Recording.records`; a made record comes behind the /tf that it is made of."""
         wanted = set(self.topics if topics is None else topics)
         made = wanted & self._edges.keys()
         read = (wanted - made) | (set(self._moving) if made else set())
@@ -59,7 +59,7 @@ class WithTransforms(Recording):
         message = record.read()
         for topic in sorted(topics) if message is not None else ():
             for one in moved(message, self._edges[topic]):
-                with suppress(ValueError):  # what is no transform tells nothing
+                with suppress(ValueError):  # skip an invalid transform
                     yield Record.of(topic, self._message(topic, one), record.stamp_ns)
 
     def _message(self, topic: str, one: Any) -> Any:
@@ -90,7 +90,7 @@ class WithTransforms(Recording):
 
 
 def with_transforms(recording: Recording, outright: bool = False) -> Recording:
-    """The recording with what its /tf tells of its camera's odometry and truth; as it is where that tells neither.
+    """The recording with the odometry and truth of its camera from /tf; as it is where /tf has neither.
 
     ``outright``: odometry is wanted of /tf, be it that of a map.
     """
@@ -107,7 +107,7 @@ def with_transforms(recording: Recording, outright: bool = False) -> Recording:
 
 
 def by_transforms(recording: Recording, inputs: Inputs) -> tuple[str, ...]:
-    """What is taken from /tf, in words for the user."""
+    """The inputs that are taken from /tf, as text for the user."""
     if not isinstance(recording, WithTransforms):
         return ()
     odometry = [f"odometry is that of /tf, {recording.edge(TF_ODOM)}"] if inputs.odom == TF_ODOM else []
@@ -116,6 +116,6 @@ def by_transforms(recording: Recording, inputs: Inputs) -> tuple[str, ...]:
 
 
 def _camera_of(recording: Recording, inputs: Inputs) -> str:
-    """The frame of colour, else of depth; empty if neither tells one."""
+    """The frame of colour, else of depth; empty if neither names one."""
     topics = inputs.image, inputs.depth, inputs.points
     return next(filter(None, (frame_of(first_readable(recording, topic)) for topic in topics if topic)), "")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a topic may be, by its type and by the names that drivers use.
+"""The inputs that a topic may serve, by its type and by the names that drivers use.
 
 Drivers do not agree on names, so a rule is a ranking: the first pattern that fits wins.
 """
@@ -40,7 +40,7 @@ class Rule:
 DEPTH_ENCODING = r"/compressedDepth$"  # a transport that takes nothing but depth
 STEREO = r"stereo/image_(raw|rect)(/|$)"  # OAK-D: the depth of its two grey cameras
 COLOUR_FOLDER = r"/(rgb|colou?r)(/|$)"
-# A word before a folder of colour is a camera's name: /depth_cam/rgb/image_raw, /right_arm/camera/color/image_raw.
+# A part before a folder of colour is a camera's name: /depth_cam/rgb/image_raw, /right_arm/camera/color/image_raw.
 IS_KIND = rf"(?!.*{COLOUR_FOLDER})"
 HALF_OF_STEREO = rf"(^|/)(left|right)(/|$)|(?<![a-z])(left|right){IS_KIND}"
 
@@ -96,7 +96,7 @@ RULES = {
     ),
     "ground_truth": Rule(POSES, r"(?!.*(" + TRUTH + r"))^", (TRUTH,)),
 }
-# Without an Odometry: what /tf tells (`tf_odometry`), else poses whose names say so.
+# Without an Odometry: what /tf states (`tf_odometry`), else poses whose names say so.
 POSE_ODOM = Rule(
     ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped"),
     rf"{TRUTH}|initial_?pose|goal|target|amcl|waypoint|set_?point|tag|marker|object",

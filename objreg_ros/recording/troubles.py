@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What would go wrong with a recording or be missed of it, before anything runs."""
+"""Problems and missing inputs of a recording, found before anything runs."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ FOLDER = "give the folder what is missing, or leave out --remap"
 CAMERA_YAML = (
     "give camera.yaml the width, height, fx, fy, cx and cy of the depth pictures, or name --camera fx,fy,cx,cy"
 )
-NAME_INFO = "name the right one with --remap camera_info:=/topic, or tell the camera with --camera fx,fy,cx,cy"
+NAME_INFO = "name the right one with --remap camera_info:=/topic, or give the camera with --camera fx,fy,cx,cy"
 REGISTER_FILES = "export depth and colour of one field of view: depth that is registered to colour"
 
 
 def missing(inputs: Inputs, of_pictures: bool = False) -> Finding | None:
-    """What keeps the graph from running; None where nothing does. ``of_pictures`` is that of the recording."""
+    """The obstacle that keeps the graph from running, or None. ``of_pictures`` is that of the recording."""
     if not inputs.missing:
         return None
     if of_pictures:
@@ -62,13 +62,13 @@ def unpaired(recording: Recording, inputs: Inputs) -> Finding | None:
 
 
 def warnings(recording: Recording, inputs: Inputs) -> list[Finding]:
-    """What would go wrong or be missed, and what to do; empty if nothing."""
+    """The problems and missing inputs, and their remedies; empty if none."""
     lacking = unpaired(recording, inputs) or missing(inputs, recording.of_pictures)
     found = [Finding(note) for note in recording.notes] + ([lacking] if lacking else [])
     if inputs.odom is None:
         found.append(Finding("no odometry: the registrar follows the camera by itself, and the gate is less strict"))
     if inputs.ground_truth is None:
-        found.append(Finding("no ground truth: the true error of constraints cannot be told"))
+        found.append(Finding("no ground truth: the true error of constraints is not known"))
     found += map(Finding, [*_mount_of_camera(recording, inputs), *_mount_of_imu(recording, inputs)])
     for look in (_first_messages, _camera, _registration, stamps, _scale):
         found += look(recording, inputs)
@@ -81,7 +81,7 @@ def troubles(recording: Recording, inputs: Inputs) -> list[Finding]:
 
 
 def _first_messages(recording: Recording, inputs: Inputs) -> list[Finding]:
-    """What the nodes would say of the first messages."""
+    """The findings that the nodes would report of the first messages."""
     found: list[Finding] = []
     _try(found, "image", recording, inputs.image, from_msg.image)
     depth = _try(found, "depth", recording, inputs.depth, lambda m: from_msg.depth(m).shape)
@@ -102,7 +102,7 @@ def _first_messages(recording: Recording, inputs: Inputs) -> list[Finding]:
             Finding(
                 "points are not organised and there is no camera_info to project them with",
                 "they are of a driver that leaves out pixels without depth",
-                "name a camera_info with --remap camera_info:=/topic, or tell the camera with --camera fx,fy,cx,cy",
+                "name a camera_info with --remap camera_info:=/topic, or give the camera with --camera fx,fy,cx,cy",
                 "no-camera-info",
             )
         )
@@ -159,7 +159,7 @@ def _registration(recording: Recording, inputs: Inputs) -> list[Finding]:
 
 
 def _register(recording: Recording) -> str:
-    """What to do about depth that is not registered."""
+    """The remedy for depth that is not registered."""
     return REGISTER_FILES if recording.of_pictures else REGISTER
 
 
@@ -191,7 +191,7 @@ def _mount_of_camera(recording: Recording, inputs: Inputs) -> list[str]:
         return []
     return [
         f"odometry is of {body} and depth in {camera}, and neither /tf_static nor /tf ties them: the mount is measured "
-        "from the motion, if that tells it; set T_base_camera of registrar and mapper if you know it"
+        "from the motion, if that suffices; set T_base_camera of registrar and mapper if you know it"
     ]
 
 
@@ -201,18 +201,18 @@ def _mount_of_imu(recording: Recording, inputs: Inputs) -> list[str]:
     if not camera or not imu or camera == imu or frame_tree(recording, camera, imu).tie(camera, imu) is not None:
         return []
     return [
-        f"the IMU is in the frame {imu} and depth in {camera}, and neither /tf_static nor /tf ties them: it tells "
+        f"the IMU is in the frame {imu} and depth in {camera}, and neither /tf_static nor /tf ties them: it gives "
         "gravity only with segmenter.T_camera_imu, its pose in the camera's optical frame"
     ]
 
 
 def _frame_id(recording: Recording, topic: str | None) -> str:
-    """The frame of a topic's first message; empty if it tells none."""
+    """The frame of a topic's first message; empty if it names none."""
     return frame_of(first_readable(recording, topic))
 
 
 def _scale(recording: Recording, inputs: Inputs) -> Iterator[Finding]:
-    """Whether what is told as depth can be metres or millimetres at all."""
+    """Whether the values of depth can be metres or millimetres at all."""
     ranges = [reach for metres in _depths(recording, inputs.depth) if (reach := _reach_m(metres)) is not None]
     if not ranges:
         return
@@ -226,7 +226,7 @@ def _scale(recording: Recording, inputs: Inputs) -> Iterator[Finding]:
 
 
 def _depths(recording: Recording, topic: str | None) -> Iterator[Array]:
-    """Depth (H, W) m at some moments of the recording; those that do not decode are left out."""
+    """Depth (H, W) m at some times of the recording; those that do not decode are left out."""
     span_ns = recording.end_ns - recording.start_ns
     for k in range(MOMENTS if topic else 0):
         record = next(recording.records([topic or ""], recording.start_ns + k * span_ns // MOMENTS), None)
@@ -240,8 +240,8 @@ def _depths(recording: Recording, topic: str | None) -> Iterator[Array]:
 
 def _reach_m(metres: Array) -> tuple[float, float] | None:
     """Where depth begins and ends, a twentieth of its pixels aside; None where there is none."""
-    told = metres[np.isfinite(metres) & (metres > 0)]
-    return None if not len(told) else (float(np.quantile(told, 0.05)), float(np.quantile(told, 0.95)))
+    valid = metres[np.isfinite(metres) & (metres > 0)]
+    return None if not len(valid) else (float(np.quantile(valid, 0.05)), float(np.quantile(valid, 0.95)))
 
 
 def _first(recording: Recording, topic: str | None) -> Record | None:

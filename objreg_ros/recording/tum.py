@@ -4,7 +4,7 @@
 ``rgb/`` and ``depth/`` (16-bit PNG registered to colour), ``associations.txt`` (colour or depth first) or ``rgb.txt``
 and ``depth.txt``,
 ``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world), ``accelerometer.txt``
-(timestamp ax ay az in m/s^2, in axes of its own that the benchmark does not tell) and ``camera.yaml`` (see
+(timestamp ax ay az in m/s^2, in axes of its own that the benchmark does not define) and ``camera.yaml`` (see
 `tum_camera`), which may all be missing. See Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems"
 (2012).
 """
@@ -45,7 +45,7 @@ from objreg_ros.recording.tum_lists import are_frame_numbers, pose_columns, read
 
 IMU_FRAME = "accelerometer"
 ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
-AROUND_NS = 500_000_000  # what the accelerometer felt before and after all pictures is left out
+AROUND_NS = 500_000_000  # samples of the accelerometer farther from all pictures than this are left out
 MOST_NAMED = 5  # files in a note
 ASSOCIATIONS = ("associations.txt", "associate.txt", "association.txt", "assoc.txt")
 
@@ -109,7 +109,7 @@ def _listed(folder: Path, file: Path) -> Pairs:
 
 
 def _is_depth_first(folder: Path, pairs: Sequence[Pair]) -> bool:
-    """Whether the first file of a pair is depth and the second is not, by the first pair that tells."""
+    """Whether the first file of a pair is depth and the second is not, by the first pair where the two differ."""
     for _, first, _, second in pairs:
         kinds = is_depth(folder / first), is_depth(folder / second)
         if kinds[0] != kinds[1]:
@@ -143,7 +143,7 @@ def _pictures(folder: Path, name: str) -> list[Named]:
 
 
 def _files(folder: Path, name: str) -> list[Path]:
-    """What is in the folder of pictures, where no list says it."""
+    """The files in the folder of pictures, where there is no list."""
     here = folder / name
     return sorted(here.iterdir()) if here.is_dir() and not here.with_suffix(".txt").exists() else []
 
@@ -178,8 +178,8 @@ def _around(stamps: Array, stamp: int) -> list[tuple[int, int]]:
 
 def _accelerations(file: Path, first_ns: int, last_ns: int) -> list[Moment]:
     """The rows of an accelerometer within a time; none where there is no such file."""
-    told = [_acceleration(row, file) for row in read_table(file, 4).rows] if file.exists() else []
-    return [moment for moment in told if first_ns <= moment.stamp_ns <= last_ns]
+    samples = [_acceleration(row, file) for row in read_table(file, 4).rows] if file.exists() else []
+    return [sample for sample in samples if first_ns <= sample.stamp_ns <= last_ns]
 
 
 def _acceleration(row: list[str], file: Path) -> Moment:
@@ -197,9 +197,9 @@ def _ground_truth(file: Path, frame_numbers: bool) -> tuple[list[Moment], list[s
         return [], []
     rows, names = read_table(file, 8)
     columns = pose_columns(names)
-    told = [_true_moment(row, columns, file) for row in rows]
-    moments = [moment for moment in told if moment is not None]
-    notes = passed_over(len(told) - len(moments), len(told), file.name)
+    poses = [_true_moment(row, columns, file) for row in rows]
+    moments = [moment for moment in poses if moment is not None]
+    notes = passed_over(len(poses) - len(moments), len(poses), file.name)
     if frame_numbers and rows and not are_frame_numbers(row[0] for row in rows):
         notes.append(f"{file.name} has other times than the pictures, which are the numbers of frames")
     return moments, notes

@@ -58,15 +58,15 @@ def camera_file(folder: Path) -> Path:
 
 
 def read_camera(file: Path, width: int, height: int, colour: Size | None = None) -> TumCamera:
-    """The camera in ``file`` for depth pictures of so many pixels; the default one where there is no file.
+    """The camera in ``file`` for depth pictures of this size; the default one where there is no file.
 
     ``colour`` is the size of the colour pictures: a file of those is scaled to depth, and that is said. ValueError for
     what is no camera, or if the file gives none of fx fy cx cy.
     """
-    told, notes = _told(file) if file.exists() else ({}, [])
-    size = _size_of(told, (width, height), colour or (width, height))
+    given, notes = _given(file) if file.exists() else ({}, [])
+    size = _size_of(given, (width, height), colour or (width, height))
     assumed = _default(*size)
-    values = {"width": size[0], "height": size[1], "distortion": (0.0,) * 5, **assumed, **told}
+    values = {"width": size[0], "height": size[1], "distortion": (0.0,) * 5, **assumed, **given}
     try:
         intrinsics = Intrinsics(**{name: float(values[name]) for name in PINHOLE}, width=size[0], height=size[1])
         scale, distortion = _depth_scale(values["depth_scale"]), _distortion(values["distortion"])
@@ -76,9 +76,9 @@ def read_camera(file: Path, width: int, height: int, colour: Size | None = None)
             f"got: {error}"
         ) from error
     fitting = scaled(intrinsics, width, height)
-    if told and fitting is not intrinsics:
+    if given and fitting is not intrinsics:
         notes = [*notes, f"{file.name} is of pictures of {size[0]} × {size[1]}: scaled to depth's {width} × {height}"]
-    return TumCamera(fitting, scale, distortion, (*_notes(file, told, assumed), *notes))
+    return TumCamera(fitting, scale, distortion, (*_notes(file, given, assumed), *notes))
 
 
 def scaled(camera: Intrinsics, width: int, height: int) -> Intrinsics:
@@ -93,14 +93,14 @@ def scaled(camera: Intrinsics, width: int, height: int) -> Intrinsics:
     return Intrinsics(fx=across * camera.fx, fy=down * camera.fy, cx=cx, cy=cy, width=width, height=height)
 
 
-def _size_of(told: Mapping[str, Any], depth: Size, colour: Size) -> Size:
+def _size_of(given: Mapping[str, Any], depth: Size, colour: Size) -> Size:
     """Width and height of the pictures that a file is of: as it says, else by which of the two its centre halves."""
     try:
-        if told.get("width") or told.get("height"):
-            return int(told.get("width", depth[0])), int(told.get("height", depth[1]))
-        cx = float(told.get("cx", depth[0] / 2))
+        if given.get("width") or given.get("height"):
+            return int(given.get("width", depth[0])), int(given.get("height", depth[1]))
+        cx = float(given.get("cx", depth[0] / 2))
     except (TypeError, ValueError, OverflowError):
-        return depth  # what is wrong with it is said where all is read
+        return depth  # the error is reported where all is read
     return colour if cx > math.sqrt(depth[0] * colour[0]) / 2 else depth
 
 
@@ -110,16 +110,16 @@ def _default(width: int, height: int) -> dict[str, float]:
     return {"fx": focal, "fy": focal, "cx": (width - 1) / 2, "cy": (height - 1) / 2, "depth_scale": DEPTH_SCALE}
 
 
-def _told(file: Path) -> tuple[dict[str, Any], list[str]]:
-    """What the file says, by key, and notes on it. A key without a value says nothing."""
+def _given(file: Path) -> tuple[dict[str, Any], list[str]]:
+    """The values of the file, by key, and notes on it. A key without a value is left out."""
     text = read_text(file, SETTINGS_BYTES)
-    told = _own_keys(text)
-    if told is None:
+    given = _own_keys(text)
+    if given is None:
         return _of_calibration(file, text)
-    fy = told.get("fy")
+    fy = given.get("fy")
     if isinstance(fy, int | float) and fy < 0:  # ICL-NUIM
-        return {**told, "fy": -fy}, [UPWARDS.format(file.name, fy, -fy)]
-    return told, []
+        return {**given, "fy": -fy}, [UPWARDS.format(file.name, fy, -fy)]
+    return given, []
 
 
 def _own_keys(text: str) -> dict[str, Any] | None:
@@ -128,8 +128,8 @@ def _own_keys(text: str) -> dict[str, Any] | None:
         values = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError):
         return None
-    told = {str(key): value for key, value in values.items() if value is not None} if isinstance(values, dict) else {}
-    return told if any(name in told for name in PINHOLE) else None
+    given = {str(key): value for key, value in values.items() if value is not None} if isinstance(values, dict) else {}
+    return given if any(name in given for name in PINHOLE) else None
 
 
 def _of_calibration(file: Path, text: str) -> tuple[dict[str, Any], list[str]]:
@@ -153,11 +153,11 @@ def _of_calibration(file: Path, text: str) -> tuple[dict[str, Any], list[str]]:
     return {**found, **size, **scale, **lens}, [f"{file.name}: {note}" for note in parsed.notes]
 
 
-def _notes(file: Path, told: Mapping[str, Any], assumed: Mapping[str, float]) -> list[str]:
-    """What the file does not say, and what it says that nobody asked for."""
-    missing = ", ".join(f"{name} {value:g}" for name, value in assumed.items() if name not in told)
-    unknown = ", ".join(name for name in told if name not in KEYS)
-    if not told:
+def _notes(file: Path, given: Mapping[str, Any], assumed: Mapping[str, float]) -> list[str]:
+    """Notes on missing values, which are assumed, and on unknown keys."""
+    missing = ", ".join(f"{name} {value:g}" for name, value in assumed.items() if name not in given)
+    unknown = ", ".join(name for name in given if name not in KEYS)
+    if not given:
         return [f"no {file.name}: the benchmark's default camera is assumed ({missing})"]
     notes = [f"{file.name} does not give all of the camera, so this is assumed: {missing}"] if missing else []
     return [*notes, *([f"{file.name}: not known, and not used: {unknown}"] if unknown else [])]

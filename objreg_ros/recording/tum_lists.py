@@ -17,7 +17,7 @@ from objreg_ros.recording.text import read_text
 
 NS_DIGITS = 19
 FRAME_DIGITS = 9  # the number of a frame has fewer than a time since 1970
-END_OF_TIME_S = 2**31  # what the stamp of a message holds, until 2038
+END_OF_TIME_S = 2**31  # the limit of a message's stamp, in 2038
 BETWEEN = re.compile(r"[\s,;]+")
 UNIT = re.compile(r"\s*[\[(][^\])]*[\])]")  # EuRoC's " [m]" and " []"
 POSITION = re.compile(r"(t|p|pos|position|tran|translation)?_?(\w+_)?([xyz])")
@@ -26,7 +26,7 @@ USUAL = (1, 2, 3, 4, 5, 6, 7)
 
 
 class Table(NamedTuple):
-    """The rows of a text file, and the names of its columns where a line above them tells."""
+    """The rows of a text file, and the names of its columns where a line above them gives these."""
 
     rows: list[list[str]]
     names: tuple[str, ...]
@@ -48,7 +48,7 @@ def read_table(file: Path, columns: int) -> Table:
 
 
 def pose_columns(names: Sequence[str]) -> tuple[int, ...]:
-    """Which columns are x y z and qx qy qz qw, by their names; the usual ones where these do not tell all."""
+    """The columns of x y z and qx qy qz qw, by their names; the usual ones where the names do not give all."""
     places: dict[str, int] = {}
     for k, name in enumerate(names):
         for kind, pattern in (("q", QUATERNION), ("t", POSITION)):

@@ -24,7 +24,7 @@ LZ4_RATIO = 256
 """LZ4 cannot say more with one byte."""
 
 FREE_BYTES = 1 << 30
-"""What stays free on the disk where a file is unpacked."""
+"""The space that stays free on the disk where a file is unpacked."""
 
 SMALL_BYTES = 1 << 30
 """Up to this size a file is unpacked at any ratio."""
@@ -41,7 +41,7 @@ RAW, RLE, COMPRESSED = 0, 1, 2
 
 
 class UnpackingError(ValueError):
-    """What is compressed would become more than is unpacked here."""
+    """Compressed data would unpack to more than the limit."""
 
 
 class Decompressor(Protocol):
@@ -94,8 +94,8 @@ def unpack_bz2(data: bytes) -> bytes:
 
 def unpack_lz4(data: bytes) -> bytes:
     """What a frame holds; `UnpackingError` for more than `CHUNK_BYTES`."""
-    told = lz4.frame.get_frame_info(data)["content_size"]
-    if told > CHUNK_BYTES:
+    size = lz4.frame.get_frame_info(data)["content_size"]
+    if size > CHUNK_BYTES:
         raise _too_much(len(data))
     if len(data) * LZ4_RATIO <= CHUNK_BYTES:
         return bytes(lz4.frame.decompress(data))

@@ -20,7 +20,7 @@ from objreg_ros.whole_file import unwritten
 
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 METADATA_VERSION: Literal[9] = 9  # Jazzy's
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # what a disk says, and no reader of a recording
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # errors of a disk, never of a reader of a recording
 
 
 def write_rosbag2(

@@ -49,9 +49,9 @@ DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}
 SOURCES = {"auto": {**POINTS, **DEPTH}, "points": POINTS, "depth": DEPTH}
 COLOUR_INFO = "colour/camera_info"
 LOOK_S = 0.5  # between two looks for who keeps a camera_info
-ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames; what an IMU feels is too
-COMPARED = 100  # of the last frames is told by how much IMU and picture disagree
-ENOUGH_COMPARED, ODD_DEG = 20, 20.0  # of so many half disagree by more: the IMU is mounted otherwise than was said
+ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames; so is an IMU's gravity
+COMPARED = 100  # the last frames over which the difference of IMU and picture is reported
+ENOUGH_COMPARED, ODD_DEG = 20, 20.0  # half of this many frames disagree by more: the IMU's mount is wrong
 IMAGES = {"image": Image, "image/compressed": CompressedImage}
 
 
@@ -72,10 +72,10 @@ class SegmenterNode(SynchronisedNode):
         self._find_pose = frames.between
         self._imu = Imu(self._inputs.imu_mounting, self._find_pose)
         self._mount = Mount(self._inputs.mounting, frames, self.get_logger().info)
-        self._told: Counter[str] = Counter()  # frames by who told their gravity
+        self._gravity_from: Counter[str] = Counter()  # frames by the source of their gravity
         self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by
-        self._lens = self._registered = ""  # what was said of the lens, and of how depth was registered
+        self._lens = self._registered = ""  # the last messages on the lens, and on the registration of depth
         self._objects = self.offer(PointCloud2, "objects", qos.room())
         self._view = self.create_publisher(PointCloud2, "view", qos.room())
         self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.room())
@@ -176,7 +176,7 @@ class SegmenterNode(SynchronisedNode):
         self.feed("depth", stamp_ns, message)
 
     def _turn_away(self, stamp_ns: int, topic: str, message: Any) -> None:
-        """Book a message that does not decode, and so does not tell where depth comes from."""
+        """Count a message that does not decode, and so does not say where depth comes from."""
         self.accept(stamp_ns)
         name = "depth" if topic in DEPTH else "points"
         self.conclude(stamp_ns, lambda: self.read(name, self._decode_depth, topic, message) is not None)
@@ -215,8 +215,8 @@ class SegmenterNode(SynchronisedNode):
         asked = self._detections.read(payload, depth, seen.camera_info, seen.raw, cloud)
         gravity, felt = self._level_gravity(payload, depth.frame_id), self._felt_gravity(payload, depth.frame_id)
         with self.accounting.timed("segment"):
-            told = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
-            frame = self._segmenter.segment(asked.detections, depth, told[0], gravity_sigma_deg=told[1])
+            prior = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
+            frame = self._segmenter.segment(asked.detections, depth, prior[0], gravity_sigma_deg=prior[1])
         self._note_gravity()
         self._doubt(asked.detections, depth, frame)
         self._publish(frame, asked.names)
@@ -234,20 +234,20 @@ class SegmenterNode(SynchronisedNode):
         return gravity
 
     def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:
-        words = match.payloads.get("imu")
-        if not words:
+        samples = match.payloads.get("imu")
+        if not samples:
             return None
-        felt = self._imu.in_camera(from_msg.gravity_at(match.stamp_ns, words), camera_frame)
+        felt = self._imu.in_camera(from_msg.gravity_at(match.stamp_ns, samples), camera_frame)
         if felt is None:
             self.throttled.remind(
-                "imu_frame", f"expected to know how the IMU is mounted, got it in {words[0].frame_id!r} and depth in "
+                "imu_frame", f"expected to know how the IMU is mounted, got it in {samples[0].frame_id!r} and depth in "
                 f"{camera_frame!r}: gravity is estimated; set segmenter.T_camera_imu, or publish it on /tf_static"
             )  # fmt: skip
         return felt
 
     def _note_gravity(self) -> None:
         choice = self._segmenter.choice
-        self._told[choice.source] += 1
+        self._gravity_from[choice.source] += 1
         if choice.disagreement_deg is None:
             return
         self._apart_deg.append(choice.disagreement_deg)
@@ -255,16 +255,16 @@ class SegmenterNode(SynchronisedNode):
         if len(self._apart_deg) >= ENOUGH_COMPARED and median > ODD_DEG:
             self.throttled.remind(
                 "imu_mounting", f"expected the gravity of the IMU and of the picture to agree, got {median:.0f} deg "
-                "between them: is segmenter.T_camera_imu right, and does the IMU tell what holds it up, not down?"
+                "between them: is segmenter.T_camera_imu right, and does its acceleration at rest point up?"
             )  # fmt: skip
 
     def extra_diagnostics(self) -> Mapping[str, object]:
-        """What matching tells, who told gravity, what of the IMU was passed over, and how the sensor errs."""
+        """What matching counts, frames by source of gravity, what of the IMU was not used, and how the sensor errs."""
         apart = sorted(self._apart_deg.copy())
-        told = {f"gravity from {source}": count for source, count in sorted(self._told.items())}
+        sources = {f"gravity from {source}": count for source, count in sorted(self._gravity_from.items())}
         passed_over = {f"imu {reason}": count for reason, count in sorted(self._imu.counts.items())}
         middle = {"gravity of imu and picture apart p50 [deg]": f"{apart[len(apart) // 2]:.1f}"} if apart else {}
-        return {**super().extra_diagnostics(), **told, **middle, **passed_over, **self._segmenter.sensor.text()}
+        return {**super().extra_diagnostics(), **sources, **middle, **passed_over, **self._segmenter.sensor.text()}
 
     def _doubt(self, detections: Detections, depth: DepthImage, frame: Frame) -> None:
         doubts = {
@@ -279,12 +279,12 @@ class SegmenterNode(SynchronisedNode):
         return match.payloads.get("camera_info", self._camera_info)
 
     def _topics(self) -> tuple[str, str]:
-        """What the topics of depth and of colour are called behind all remaps."""
+        """The names of the topics of depth and of colour after all remaps."""
         image = (self.taken("image") if self._inputs.colour and self._source in DEPTH else None) or "image"
         return self.resolve_topic_name(self._source or "depth/image"), self.resolve_topic_name(image)
 
     def _raw_pictures(self) -> lenses.Raw:
-        """Which pictures are to be rectified, by the names of their topics."""
+        """The pictures to rectify, by the names of their topics."""
         return lenses.raw_pictures(self._inputs.rectified, *self._topics())
 
     def _cameras(self, camera_info: Any) -> colour_frame.Cameras:

@@ -14,7 +14,7 @@ PAPER_Z_MAX, PAPER_Y_MAX = 1.75, 0.75  # the passthrough limits of the founding 
 
 @dataclass(frozen=True)
 class SegmenterParams(Params):
-    """What a user may change in the segmenter."""
+    """The parameters of the segmenter."""
 
     preset: str = param("default", "the method; paper is the founding filter of each box", choices=("default", "paper"))
     z_min: float = param(0.2, "nearest depth that is believed", "m", ge=0.0, live=True)
@@ -30,7 +30,7 @@ class SegmenterParams(Params):
     jump: float = param(0.012, "depth step that ends an object, at the camera", "m", ge=0.001, live=True)
     jump_z2: float = param(0.012, "how the depth step grows with squared depth", "1/m", ge=0.0, live=True)
     crease: float = param(
-        20.0, "a concave bend sharper than this separates two things", "deg", ge=5.0, le=90.0, live=True
+        20.0, "a concave bend sharper than this separates two objects", "deg", ge=5.0, le=90.0, live=True
     )
     height: float = param(
         0.0005, "a point this far above the support still belongs to it, if there were no noise", "m", ge=0.0, live=True
@@ -79,7 +79,7 @@ class SegmenterNodeParams(MountedParams):
     slop: float = param(0.02, "largest distance in time between depth and what goes with it", "s", ge=0.0)
     rectified: str = param(
         "auto",
-        "which of depth and image come without the distortion that camera_info tells of; auto: those whose topic has "
+        "which of depth and image come without the distortion that camera_info gives; auto: those whose topic has "
         "rect in its name; the others are rectified here",
         choices=("auto", "all", "none"),
     )

@@ -26,17 +26,17 @@ from objreg_ros.segmenter.sensor.view import reduced_view, step_for
 from objreg_ros.segmenter.surface.cells import Surface, cell_size, reduce
 from objreg_ros.segmenter.surface.support import Ground, find_supports
 
-COARSE = 2  # every so many cells tell gravity and the support surfaces
+COARSE = 2  # every so many cells are used for gravity and the support surfaces
 WARM_SIZES = ((640, 480), (320, 240))  # two and one pixel a cell: each has a kernel of its own
 LARGEST_BLOCK = 24 << 20  # bytes
-NORMALS = 3  # every so many of these tell gravity
+NORMALS = 3  # every so many of these are used for gravity
 
 
 class Segmenter:
     """Segments one frame at a time.
 
     Between frames it keeps ``sensor``: how noisy depth is, how it is turned against colour and how late it is, and
-    ``choice``: who told the last one's gravity.
+    ``choice``: the source of the last one's gravity.
 
     A second thread takes half of the boxes: the kernels let go of the interpreter's lock.
     """
@@ -80,10 +80,10 @@ class Segmenter:
         masks: Sequence[Array | None] | None = None,
         gravity_sigma_deg: float | None = None,
     ) -> Frame:
-        """The objects of one moment, in the order of their boxes; stamp and frame_id are those of ``depth``.
+        """The objects of one frame, in the order of their boxes; stamp and frame_id are those of ``depth``.
 
         Boxes of a picture of another size are scaled by ``detections.image_hw`` to the depth image, which must show
-        the same field of view. ``gravity (3,)`` is the way things fall in the camera frame where an odometry or an IMU
+        the same field of view. ``gravity (3,)`` is its direction in the camera frame where an odometry or an IMU
         knows it. With ``gravity_sigma_deg``, the standard deviation of its tilts, it is handed on where it is surer
         than what the frame shows; without, in any case and with confidence 1. Where there is none it is estimated from
         the frame. A box without an object of `min_points` gives none, and so does that of a person, who is no part of a
@@ -214,12 +214,12 @@ def _block_on_table(camera: Intrinsics) -> Array:
 
 
 def _choice(surface: Surface, gravity: Array | None, sigma_deg: float | None, params: SegmenterParams) -> GravityChoice:
-    told = None if gravity is None else -_direction(gravity)
-    if told is not None and sigma_deg is None:
-        return GravityChoice(told, 1.0, "odom")
+    up = None if gravity is None else -_direction(gravity)
+    if up is not None and sigma_deg is None:
+        return GravityChoice(up, 1.0, "odom")
     seen, confidence = estimate_up(known_normals(surface.normals, NORMALS), camera_up(params.roll), params.up_tilt)
-    if told is not None and sigma_deg is not None:
-        return choose_gravity(told, sigma_deg, seen, confidence)
+    if up is not None and sigma_deg is not None:
+        return choose_gravity(up, sigma_deg, seen, confidence)
     return GravityChoice(seen, confidence, "nothing" if seen is None else "picture")
 
 

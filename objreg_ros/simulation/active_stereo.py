@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What active stereo makes of true depth, as a RealSense D435 does it.
+"""Active stereo: depth with the errors of a RealSense D435.
 
 * The error of disparity is ``subpixel`` px, so that of depth is z^2 subpixel / (focal baseline): 3.8 mm at 1 m and
   34 mm at 3 m (Intel, "Best known methods for tuning RealSense D400 depth cameras", 2018, has the formula and 0.08 px).

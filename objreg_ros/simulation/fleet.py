@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stories of several robots at once: one world, one clock, and each robot's own way.
+"""Stories of several robots at once: one world, one clock, and each robot's own path.
 
 | scenario | what happens |
 | --- | --- |
 | `robots` | three robots in three rooms (`building`); each pair of them visits the table of at least one room |
 
 Each looks at a table from a little aside of where the others do. A robot begins when the one before has a third of its
-way behind it.
+path behind it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from objreg_ros.simulation.visits import Look
 
 Random = np.random.Generator
 Ways = tuple[Scene, list[list[Waypoint]]]
-"""The scene, and the way of each robot."""
+"""The scene, and the path of each robot."""
 
 ROUTES = ((0, 1, 0, 1), (2, 1, 2, 1), (0, 1, 2, 1))
 """The tables that each robot visits, by the numbers of their rooms."""
@@ -31,11 +31,11 @@ ROBOTS = len(ROUTES)
 ASIDES = (0.0, 1.0, -1.0)
 """To which side of the front of a table each robot stands."""
 HEIGHT_M = 1.35
-"""How high a camera is carried from room to room."""
+"""The height at which a camera is carried from room to room."""
 STEP_M = 0.7
 """So far before and behind an opening a robot looks straight through it."""
 BEHIND = 1 / 3
-"""Of its way each robot has so much behind it when the next one begins."""
+"""Each robot has this share of its path behind it when the next one begins."""
 
 
 def _robots(rng: Random, occluders: int) -> Ways:
@@ -70,7 +70,7 @@ FLEETS: dict[str, Callable[[Random, int], Ways]] = {"robots": _robots}
 def make_fleet(scenario: str, seed: int, frames: int = 600, rate: float = 30.0, occluders: int = 0) -> list[Story]:
     """A story of each robot, ``frames`` long; everything follows from the arguments.
 
-    All have one scene and one ``rate`` in Hz, which comes down where so few frames would make the longest way faster
+    All have one scene and one ``rate`` in Hz, which comes down where so few frames would make the longest path faster
     than a hand moves a camera. The robots are called robot1, robot2 and so on. ValueError for an unknown scenario.
     """
     if scenario not in FLEETS:

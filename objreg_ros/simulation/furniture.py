@@ -31,7 +31,7 @@ class Furniture:
 
 
 def surface(rng: Random) -> Material:
-    """What a table top or a cupboard is made of."""
+    """The material of a table top or a cupboard."""
     kind = rng.integers(4)
     picture = (
         texture.wood(rng)

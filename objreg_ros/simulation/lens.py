@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a lens with plumb-bob distortion (k1, k2, p1, p2, k3; OpenCV's model) makes of a pinhole camera's view."""
+"""A pinhole camera's view through a lens with plumb-bob distortion (k1, k2, p1, p2, k3; OpenCV's model)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_OFF_PX = 1e5
 """Beyond this the iteration has diverged."""
 MARGIN_PX = 2
 WIDEST = 3.0
-"""No view is drawn more than so many times as wide and as high as the picture."""
+"""A drawn view is at most this many times as wide and as high as the picture."""
 
 
 class Lens:

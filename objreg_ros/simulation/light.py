@@ -19,7 +19,7 @@ from objreg_ros.simulation.raster import rasterise
 from objreg_ros.simulation.surfaces import Surfaces
 
 FAR_ABOVE_M = 60.0
-"""From so far away the view straight down is as good as parallel."""
+"""From this distance the view straight down is as good as parallel."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,7 +89,7 @@ class ObjectModel:
         return float(np.linalg.norm(self.mesh.vertices[:, :2], axis=1).max())
 
     def resting(self, choice: int, yaw: float) -> Array:
-        """``T_surface_object``: the object at rest on z = 0, standing for 0 or in its ``choice``-th other way."""
+        """``T_surface_object``: the object at rest on z = 0, standing for 0 or in its ``choice``-th other pose."""
         R = np.eye(4) if choice == 0 else self.rests[choice - 1]
         turned = transform(R, self.mesh.vertices.astype(float))
         low, high = turned.min(0), turned.max(0)

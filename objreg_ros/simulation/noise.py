@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a structured-light sensor makes of true depth: noise, steps, shadows, lost and mixed pixels.
+"""Depth with the errors of a structured-light sensor: noise, steps, shadows, lost and mixed pixels.
 
 The axial noise is that of Nguyen, Izadi and Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and
 tracking" (2012): 0.0012 + 0.0019 (z - 0.4)^2 metres. It is correlated between neighbours, more along a row than across,

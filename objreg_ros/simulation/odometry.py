@@ -3,7 +3,7 @@
 
 After one metre the relative pose error is about ``distance_drift`` in position and ``turn_drift`` in heading:
 
-* the heading turns steadily with the way, as with unequal wheels (Borenstein and Feng, "Measurement and Correction of
+* the heading turns steadily with the path, as with unequal wheels (Borenstein and Feng, "Measurement and Correction of
   Systematic Odometry Errors in Mobile Robots", 1996), and wanders; the wandering is a tenth of the variance,
 * every motion is wrong by a constant share of its length, as much along it (scale) as across it (mounting), and the
   position wanders; the wandering is half of the variance,
@@ -11,7 +11,7 @@ After one metre the relative pose error is about ``distance_drift`` in position 
 * each pose errs for itself by ``turn_jitter`` and ``distance_jitter`` (root mean square, white): a jittering tracker.
 
 What is constant has a sign at random and a size within a quarter of the stated one, so that every run drifts about as
-much. What wanders grows with the root of the way; what is constant grows with the way.
+much. What wanders grows with the root of the path length; what is constant grows with the path length.
 
 The odometry frame has z up and begins under the first camera, its x axis where that camera looks.
 """
@@ -33,7 +33,7 @@ STEADY_HEADING = 0.9
 STEADY_POSITION = 0.5
 """The same of the position's."""
 VARIETY = 0.25
-"""How far the size of a constant error is from the stated one, at most."""
+"""The largest relative difference between the size of a constant error and the stated one."""
 
 
 def drifted(T_world_camera: Array, params: OdometryParams, seed: int) -> tuple[Array, Array]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be set of the simulated camera, of the stress put on it, and of the odometry."""
+"""The parameters of the simulated camera, of the stress put on it, and of the odometry."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ DepthSensing = DepthParams | StereoParams | TimeOfFlightParams
 
 @dataclass(frozen=True)
 class RigParams(Params):
-    """How the two cameras are built and timed; all zero by default. Where an error points is drawn by the seed."""
+    """How the two cameras are built and timed; all zero by default. The seed draws the direction of an error."""
 
     distortion: tuple[float, ...] = param(
         (0.0, 0.0, 0.0, 0.0, 0.0), "k1, k2, p1, p2, k3 of the lens (plumb_bob)", counts=(4, 5)
@@ -95,7 +95,7 @@ class RigParams(Params):
 
     @property
     def is_plain(self) -> bool:
-        """Whether nothing is wrong: a pinhole camera whose pictures are both of one moment and one place."""
+        """Whether nothing is wrong: a pinhole camera whose pictures are both of one time and one place."""
         return not any(self.distortion) and self.replaced(distortion=(0.0,) * 5) == RigParams()
 
 

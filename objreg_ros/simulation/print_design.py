@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is printed on things: cereal boxes, cans, book covers, keys, screens, posters; drawn from a random generator."""
+"""Prints on things: cereal boxes, cans, book covers, keys, screens, posters; drawn from a random generator."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ def printed_page(rng: Random, size: int = 128) -> Array:
 
 
 def screen(rng: Random, size: int = 256) -> Array:
-    """What a screen that is on shows: a desktop with windows, text or code, a picture or a page."""
+    """The picture of a screen that is on: a desktop with windows, text or code, a picture or a page."""
     kind = rng.integers(4)
     image = cv2.resize(picture(rng), (size, size)) if kind != 3 else filled(grey(rng, 0.05, 1.0), size)
     if kind != 0:

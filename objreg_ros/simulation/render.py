@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a camera sees of a scene: depth and colour as the sensors give them, and the truth behind them."""
+"""A camera's view of a scene: depth and colour as the sensors give them, and the truth behind them."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Rendering:
 
     @property
     def objects(self) -> tuple[Seen, ...]:
-        """What is visible of the nine classes."""
+        """The visible objects of the nine classes."""
         return tuple(o for o in self.seen if not o.is_distractor)
 
 
@@ -87,7 +87,7 @@ def render(
 
 
 def truth_of(scene: Scene, view: View, T_world_camera: Array, measured: Array, rgb: Array | None) -> Rendering:
-    """What was measured, with the truth of a view."""
+    """The measurement, with the truth of a view."""
     nearness, triangle = view.nearness, view.triangle
     true_depth = np.divide(1, nearness, out=np.zeros(nearness.shape, np.float32), where=nearness > 0)
     instance = np.where(triangle >= 0, scene.surfaces.instance[triangle], 0).astype(np.uint16)

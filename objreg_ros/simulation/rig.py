@@ -3,9 +3,9 @@
 
 * The depth image shows the pose of ``lag_ms`` before the colour image, and carries the same stamp.
 * Row r of colour is exposed ``rolling_ms`` (r / H - 1/2) after the stamp, for ``blur_ms`` about that time. Light is
-  drawn in bands of rows and at moments of the exposure, so many that the picture moves half a pixel from one to the
-  next (but at most `MOST_STEPS`), and the moments' linear light is averaged. Two things are approximate: a band has one
-  time, and rows are those of the pinhole picture, before the lens. Depth is taken at one moment.
+  drawn in bands of rows and at times of the exposure, so many that the picture moves half a pixel from one to the
+  next (but at most `MOST_STEPS`), and their linear light is averaged. Two things are approximate: a band has one
+  time, and rows are those of the pinhole picture, before the lens. Depth is taken at one time.
 * Misregistration is a shift of the depth image, a rotation and a displacement of the depth camera, the same throughout
   a recording. Sizes are given; directions follow from the recording's seed.
 * The lens bends both images, as with depth that a driver has registered to a colour image that it did not rectify.
@@ -32,10 +32,10 @@ from objreg_ros.simulation.shade import shade
 from objreg_ros.simulation.view import View, draw
 
 STEP_PX = 0.5
-"""The picture moves about so much from one band or moment to the next."""
+"""The motion of the picture in px from one band or time to the next."""
 MOST_STEPS = 16
 NEAREST_M = 0.7
-"""What is nearer moves further than `STEP_PX`."""
+"""Nearer surfaces move further than `STEP_PX`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stands and lies in the rooms of stories: things on tables and boards, chairs, and furniture along the walls."""
+"""The contents of the rooms of stories: things on tables and boards, chairs, and furniture along the walls."""
 
 from __future__ import annotations
 

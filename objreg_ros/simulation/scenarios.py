@@ -49,7 +49,7 @@ DETOUR_M = 1.4
 """How far from the straight line a round leads."""
 NEAR_M = 0.3
 Plot = tuple[tuple[Scene, ...], list[Waypoint], Waypoint | None]
-"""The scenes, the camera's way, and the waypoint at which the second scene takes over."""
+"""The scenes, the camera's path, and the waypoint at which the second scene takes over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def _look_alikes(rng: Random, models: list[ObjectModel]) -> list[ObjectModel]:
 
 
 def _rounds(setting: _Setting, looks: list[Look]) -> list[Waypoint]:
-    """The way past the two tables in turn, seen as the looks say."""
+    """The path past the two tables in turn, seen as the looks say."""
     visits = [look.waypoints(setting.centre(k % 2)) for k, look in enumerate(looks)]
     way = visits[0]
     for k, visit in enumerate(visits[1:]):
@@ -242,5 +242,5 @@ def make_story(scenario: str, seed: int, frames: int = 600, rate: float = 30.0, 
 
 
 def _first_passing(poses: Array, waypoint: Waypoint) -> int:
-    """The first frame whose camera is near a waypoint of its way."""
+    """The first frame whose camera is near a waypoint of its path."""
     return int(np.argmax(np.linalg.norm(poses[:, :3, 3] - waypoint.eye, axis=1) < NEAR_M))

@@ -152,7 +152,7 @@ def brushed(rng: np.random.Generator, size: int = 128) -> Array:
 
 
 def patches(rng: np.random.Generator, size: int = 128) -> Array:
-    """A wild pattern of coloured shapes: something that no object of interest is told by."""
+    """A wild pattern of coloured shapes: no object of interest is recognised by it."""
     picture = filled(vivid(rng) if rng.random() < 0.5 else muted(rng), size)
     for _ in range(int(rng.integers(2, 18))):
         colour = vivid(rng) if rng.random() < 0.6 else grey(rng)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a time-of-flight sensor makes of true depth, as an Azure Kinect does it.
+"""Time of flight: depth with the errors of an Azure Kinect.
 
 * The signal is reflectance times the cosine of the viewing angle over distance squared. The error by shot noise goes
   with one over its root: ``noise`` z / sqrt(reflectance cosine), pixel by pixel (Lange and Seitz, "Solid-state
@@ -26,7 +26,7 @@ from objreg_ros.simulation.view import View
 
 LEAST_REFLECTANCE = 0.004
 SURROUNDINGS_SHARE = 0.08
-"""A corner is told by a square of this share of the picture's width."""
+"""A corner is found by a square of this share of the picture's width."""
 CORNER_SHARE = 0.02
 """Where surroundings are nearer by this share, a corner is three quarters as strong as one can be."""
 HOLE_PX = 5

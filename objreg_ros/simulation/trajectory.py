@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a camera is carried by hand: a smooth way past waypoints at realistic speeds, with a little tremor."""
+"""How a camera is carried by hand: a smooth path past waypoints at realistic speeds, with a little tremor."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from objreg_ros.geometry import inverse, pose, rotation_from_vector
 Random = np.random.Generator
 
 STEPS = 2000
-"""A way is followed in so many steps before it is cut into frames."""
+"""A path is sampled at this number of steps before it is cut into frames."""
 ROUNDING_M = 0.2
-"""Corners of a way are rounded over about this length."""
+"""Corners of a path are rounded over about this length."""
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -49,9 +49,9 @@ def around(centre: Array, radius: float, height: float, start: float, stop: floa
 
 
 def carried(waypoints: Sequence[Waypoint], frames: int, rate: float, rng: Random, hand: Hand) -> tuple[Array, float]:
-    """The poses ``T_world_camera (frames, 4, 4)`` on a way past the waypoints, and the frame rate in Hz.
+    """The poses ``T_world_camera (frames, 4, 4)`` on a path past the waypoints, and the frame rate in Hz.
 
-    The whole way is walked in the given number of frames. Where ``rate`` would make that faster than the hand moves,
+    The whole path is walked in the given number of frames. Where ``rate`` would make that faster than the hand moves,
     the frame rate comes down instead.
     """
     if frames < 2 or len(waypoints) < 2:
@@ -83,7 +83,7 @@ def _turned(poses: Array) -> Array:
 def _smooth_way(waypoints: Sequence[Waypoint]) -> tuple[Array, Array]:
     """Eyes and viewing directions (STEPS, 3): straight from waypoint to waypoint, then rounded off.
 
-    Directions go by azimuth and elevation, the short way round, so that the view never sinks to the floor between.
+    Directions go by azimuth and elevation, the shorter arc, so that the view never sinks to the floor between.
     """
     eyes = np.array([w.eye for w in waypoints], float)
     ahead = np.array([w.target for w in waypoints], float) - eyes

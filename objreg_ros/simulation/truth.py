@@ -154,7 +154,7 @@ def _frame(line: dict[str, Any], objects: tuple[dict[int, TrueObject], ...]) -> 
 
 
 class TruthWriter:
-    """Collects the truth frame by frame and writes it when told to; small enough to be kept in memory until then."""
+    """Collects the truth frame by frame and writes it on `write`; small enough to be kept in memory until then."""
 
     def __init__(
         self, story: Story, scenario: str, seed: int, intrinsics: Intrinsics, sensors: dict[str, Any] | None = None

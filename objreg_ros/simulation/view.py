@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a pinhole camera sees of a scene before any sensor: nearness, faces and light of every pixel."""
+"""A pinhole camera's view of a scene before any sensor: nearness, faces and light of every pixel."""
 
 from __future__ import annotations
 

@@ -30,9 +30,9 @@ class WalkParams:
     step_m: float = 0.25
     corridor_m: float = 5.0
     corridors: int = 3
-    drift_m: float = 0.02  # after one metre or one radian, growing with the root of the way
+    drift_m: float = 0.02  # after one metre or one radian, growing with the root of the path length
     drift_deg: float = 1.0
-    heading_deg_per_m: float = 0.0  # what is steadily wrong
+    heading_deg_per_m: float = 0.0  # the steady error
     stretch: float = 0.0
     closures: int = 40
     sigma_m: float = 0.02
@@ -45,7 +45,7 @@ class WalkParams:
 
 @dataclass(frozen=True)
 class Walk:
-    """``T_world_body (n, 4, 4)``, odometry of the same moments, and closures in order, each with ``is_false (m,)``."""
+    """``T_world_body (n, 4, 4)``, odometry at the same times, and closures in order, each with ``is_false (m,)``."""
 
     T_world_body: Array
     odometry: tuple[Odometry, ...]
@@ -55,7 +55,7 @@ class Walk:
     @property
     def right_closures(self) -> tuple[LoopClosure, ...]:
         """Those that are not false."""
-        return tuple(word for word, is_false in zip(self.closures, self.is_false, strict=True) if not is_false)
+        return tuple(closure for closure, is_false in zip(self.closures, self.is_false, strict=True) if not is_false)
 
 
 def walk(params: WalkParams, seed: int) -> Walk:
@@ -65,10 +65,11 @@ def walk(params: WalkParams, seed: int) -> Walk:
     right = _right(T, params, np.random.default_rng([seed, 2]))
     lies = _false(T, len(right), params, np.random.default_rng([seed, 3]))
     rows = sorted(
-        [(word.to_ns, False, word) for word in right] + [(word.to_ns, True, word) for word in lies], key=_when
+        [(closure.to_ns, False, closure) for closure in right] + [(closure.to_ns, True, closure) for closure in lies],
+        key=_when,
     )
-    words = tuple(Odometry(T_odom_body=pose, stamp_ns=k * PERIOD_NS) for k, pose in enumerate(odometry))
-    return Walk(T, words, tuple(row[2] for row in rows), np.array([row[1] for row in rows], bool))
+    messages = tuple(Odometry(T_odom_body=pose, stamp_ns=k * PERIOD_NS) for k, pose in enumerate(odometry))
+    return Walk(T, messages, tuple(row[2] for row in rows), np.array([row[1] for row in rows], bool))
 
 
 def _when(row: tuple[int, bool, LoopClosure]) -> tuple[int, bool]:
@@ -95,7 +96,7 @@ def through_corridors(params: WalkParams, rng: np.random.Generator) -> Array:
 
 
 def drifted(T_world_body: Array, params: WalkParams, rng: np.random.Generator) -> Array:
-    """``T_odom_body (n, 4, 4)`` as odometry tells the poses, from where they begin."""
+    """``T_odom_body (n, 4, 4)`` as odometry reports the poses, from where they begin."""
     steps = inverses(T_world_body[:-1]) @ T_world_body[1:]
     lengths = np.linalg.norm(steps[:, :3, 3], axis=1)
     way = lengths + Rotation.from_matrix(steps[:, :3, :3]).magnitude()
@@ -128,7 +129,7 @@ def _false(T: Array, right: int, params: WalkParams, rng: np.random.Generator) -
     """So many that they have their shares of all."""
     alone, agreeing = params.false_share, params.agreeing_share
     scale = right / max(1.0 - alone - agreeing, 1e-9)
-    words = [_lie(T, *_moments(len(T), rng), _wrong(params, rng), params, rng) for _ in range(round(alone * scale))]
+    closures = [_lie(T, *_moments(len(T), rng), _wrong(params, rng), params, rng) for _ in range(round(alone * scale))]
     count = round(agreeing * scale)
     if count:
         a, b = _moments(len(T), rng)
@@ -136,8 +137,8 @@ def _false(T: Array, right: int, params: WalkParams, rng: np.random.Generator) -
         for _ in range(count):
             i, j = _beside(a, len(T), rng), _beside(b, len(T), rng)
             error = inverses(T[j : j + 1])[0] @ T_world_wrong @ T[j]
-            words.append(_lie(T, min(i, j), max(i, j) + (i == j), error, params, rng))
-    return words
+            closures.append(_lie(T, min(i, j), max(i, j) + (i == j), error, params, rng))
+    return closures
 
 
 def _moments(poses: int, rng: np.random.Generator) -> tuple[int, int]:

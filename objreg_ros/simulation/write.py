@@ -52,7 +52,7 @@ from objreg_ros.simulation.scenarios import Story, make_story
 from objreg_ros.simulation.truth import TruthWriter
 
 START_NS = 1_700_000_000_000_000_000
-"""When simulated recordings begin: a fixed moment, so that the same seed gives the same bytes."""
+"""When simulated recordings begin: a fixed time, so that the same seed gives the same bytes."""
 CAMERA_FRAME, ODOM_FRAME, WORLD_FRAME = "camera", "odom", "world"
 JPEG_QUALITY = 90
 HOW = {DepthParams: "structured light", StereoParams: "active stereo", TimeOfFlightParams: "time of flight"}
@@ -74,10 +74,10 @@ class Sensors:
     rig: RigParams = field(default_factory=RigParams)
 
     def described(self) -> dict[str, Any]:
-        """Every parameter by section and name, and in ``sensor`` the way in which depth is measured."""
+        """Every parameter by section and name, and in ``sensor`` how depth is measured."""
         sections = {"depth": self.depth, "colour": self.colour, "stress": self.stress}
-        told = {name: asdict(params) for name, params in sections.items()}
-        return {"sensor": HOW[type(self.depth)], **told, "odometry": asdict(self.odometry), "rig": asdict(self.rig)}
+        known = {name: asdict(params) for name, params in sections.items()}
+        return {"sensor": HOW[type(self.depth)], **known, "odometry": asdict(self.odometry), "rig": asdict(self.rig)}
 
 
 def simulate(
@@ -92,7 +92,7 @@ def simulate(
     threads: int = 2,
     progress: Callable[[int], object] = lambda done: None,
 ) -> Story:
-    """Write the recording of a scenario to a new folder; its story comes back.
+    """Write the recording of a scenario to a new folder; returns its story.
 
     ``progress`` is called with the number of frames that are done. Everything in the messages and in the truth follows
     from the arguments, ``threads`` and ``progress`` aside. ValueError for a scenario that there is not, FileExistsError

@@ -121,7 +121,7 @@ def test_a_lens_that_cannot_be_undone_is_told_with_what_to_do(tmp_path: Path) ->
 def test_a_camera_that_is_told_is_what_the_graph_would_use(tmp_path: Path) -> None:
     told = CliRunner().invoke(command, [str(tum_folder(tmp_path / "tum")), "--camera", "50,50,31.5,23.5"])
     assert told.exit_code == 0 and "64 × 48 fx 50.0 fy 50.0" in told.output
-    assert "! not used, as a camera is told: /camera_info" in told.output
+    assert "! not used, as a camera is given: /camera_info" in told.output
 
 
 def test_what_the_graph_cannot_run_on_ends_with_three(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def test_the_camera_that_is_told_takes_the_place_of_any_other_in_the_size_of_the
         inputs = choose_inputs(source.topics)
         assert (inputs.camera_info, inputs.depth) == (TOLD, "/depth/image") and inputs.complete
         assert [topic.name for topic in source.topics.values() if topic.msgtype == CAMERA_INFO] == [TOLD]
-        assert source.notes[-1] == "not used, as a camera is told: /camera_info"
+        assert source.notes[-1] == "not used, as a camera is given: /camera_info"
         records = list(source.records(set(inputs.chosen().values())))
         assert [record.topic for record in records].count(TOLD) == 1 and records[0].topic == TOLD
         camera = from_msg.intrinsics(records[0].message)

@@ -43,7 +43,7 @@ METRE = np.full((48, 64), 1000, np.uint16)
 
 
 def test_a_good_recording_has_no_warning_but_of_its_missing_truth(tmp_path: Path) -> None:
-    assert said(bag(tmp_path / "bag", records())) == "no ground truth: the true error of constraints cannot be told"
+    assert said(bag(tmp_path / "bag", records())) == "no ground truth: the true error of constraints is not known"
 
 
 def test_what_keeps_the_graph_from_running_is_said(tmp_path: Path) -> None:

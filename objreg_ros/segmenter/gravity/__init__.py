@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which direction is up: by level surfaces or by an IMU, with its deviation."""
+"""The direction of up: by level surfaces or by an IMU, with its deviation."""

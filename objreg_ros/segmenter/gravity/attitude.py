@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which way things fall, as an IMU feels it: the gyroscope carries the direction on, the accelerometer puts it right.
+"""The direction of gravity from an IMU: the gyroscope carries the direction on, the accelerometer puts it right.
 
 A Kalman filter (Kalman, 1960) on the direction of gravity in the IMU's own axes and on the gyroscope's bias, with one
 covariance for all tilts. It is the passive complementary filter of Mahony, Hamel and Pflimlin, "Nonlinear complementary
@@ -17,32 +17,32 @@ from objreg_ros.data import JUMP_NS, FeltGravity, ImuSample
 
 G = 9.80665  # m/s^2
 NORM_SLACK = 0.15  # m/s^2 off G that the scale of a cheap accelerometer explains
-STEADY_DEG = 3.0  # what an accelerometer of the right norm is off by in a hand: a push from the side hardly changes it
-ORIENTATION_DEG = 1.0  # what an orientation is off by that tells no covariance, or a smaller one
-CORRELATION_S = 0.5  # so long the errors of both last: a thousand samples within it tell no more than one
+STEADY_DEG = 3.0  # the error of an accelerometer in a hand at the right norm: a push from the side hardly changes it
+ORIENTATION_DEG = 1.0  # the error of an orientation that has no covariance, or a smaller one
+CORRELATION_S = 0.5  # for which the errors of both last: a thousand samples within it are as good as one
 TURN_DEG = 0.1  # per root second: how a gyroscope's direction wanders
-SCALE = 0.01  # of a turn that a gyroscope tells is wrong
+SCALE = 0.01  # share of a gyroscope's turn that is wrong
 GYRO_BIAS_DEG = 1.0  # per second: the bias of a gyroscope that nobody calibrated
 GYRO_WALK_DEG = 0.01  # per second and root second: how that wanders
 MOST_GYRO_BIAS_DEG = 5.0  # per second; more is no bias
-BLIND_TURN_DEG = 30.0  # per root second: how a camera in a hand turns, where no gyroscope tells
-BIAS_DEG = 0.5  # what the accelerometer's bias tilts the direction by, and no filter takes out
-LEAST_NORM, MOST_NORM = 0.5 * G, 2.0 * G  # beyond, an accelerometer feels a fall or a blow, and tells no direction
+BLIND_TURN_DEG = 30.0  # per root second: how a camera in a hand turns, where no gyroscope measures it
+BIAS_DEG = 0.5  # tilt by the accelerometer's bias, which no filter removes
+LEAST_NORM, MOST_NORM = 0.5 * G, 2.0 * G  # beyond, an accelerometer measures a fall or a blow, and gives no direction
 MOST_TURN = 70.0  # rad/s: twice what gyroscopes measure
-ORIENTATION_OFF_DEG = 20.0  # from what a steady accelerometer feels: the orientation is of a frame with z elsewhere
+ORIENTATION_OFF_DEG = 20.0  # from a steady accelerometer's direction: the orientation is of a frame whose z is not up
 GAP_NS = 500_000_000  # without a sample for longer the direction begins anew
-WORD_NS = 8_000_000  # between two words: a direction every 10 ms is enough between which to interpolate
+WORD_NS = 8_000_000  # between two outputs: a direction every 10 ms is enough for interpolation
 MOST_DEG = 90.0  # a standard deviation of more says no more
 
 Vector = tuple[float, float, float]
-Told = tuple[Vector, float]  # a direction of length 1, and its deviation in radians
+Measured = tuple[Vector, float]  # a direction of length 1, and its deviation in radians
 
 
 class AttitudeFilter:
     """The direction of gravity after every sample of one IMU; cheap enough for a thousand samples a second.
 
     ``counts`` has, by reason, what was passed over: ``late`` (a stamp that is not after the last), ``time_jump`` and
-    ``gap`` (the filter began anew there), ``no_acceleration`` and ``norm`` (nothing told a direction), ``turn`` (faster
+    ``gap`` (the filter began anew there), ``no_acceleration`` and ``norm`` (nothing gave a direction), ``turn`` (faster
     than any gyroscope measures), ``orientation_disagrees`` (with a steady accelerometer).
     """
 
@@ -55,18 +55,18 @@ class AttitudeFilter:
         self._covariance = 0.0  # of tilt and bias
         self._last_ns = 0
         self._passed_s = 0.0  # between the last two samples
-        self._word_ns: int | None = None
+        self._output_ns: int | None = None
         self._frame_id = ""
-        self._has_turned = False  # whether the gyroscope ever told more than zeros, which stand for none too
+        self._has_turned = False  # whether the gyroscope ever gave more than zeros, which stand for none too
 
     def receive(self, sample: ImuSample) -> FeltGravity | None:
         """Take a sample in; the direction at its stamp, at most one every 8 ms, and None where none is due or known."""
         if not self._go(sample):
             return None
         self._correct(sample)
-        if self._falls is None or (self._word_ns is not None and sample.stamp_ns - self._word_ns < WORD_NS):
+        if self._falls is None or (self._output_ns is not None and sample.stamp_ns - self._output_ns < WORD_NS):
             return None
-        self._word_ns = sample.stamp_ns
+        self._output_ns = sample.stamp_ns
         return FeltGravity(
             gravity=np.array(self._falls),
             gravity_sigma_deg=self.sigma_deg,
@@ -99,10 +99,10 @@ class AttitudeFilter:
 
     def _begin_anew(self, why: str) -> None:
         self.counts[why] += 1
-        self._falls, self._word_ns, self._covariance = None, None, 0.0
+        self._falls, self._output_ns, self._covariance = None, None, 0.0
 
     def _turn(self, sample: ImuSample) -> Vector | None:
-        """What the gyroscope tells, in rad/s; None where none does."""
+        """The gyroscope's angular velocity in rad/s; None without one."""
         if sample.angular_velocity is None:
             return None
         turn = x, y, z = sample.angular_velocity.tolist()
@@ -113,7 +113,7 @@ class AttitudeFilter:
         return (x, y, z) if self._has_turned else None
 
     def _carry(self, falls: Vector, turn: Vector | None, seconds: float) -> None:
-        """On by a time: what stands still in the room turns the other way in the IMU's axes."""
+        """Carry on by a time: what stands still turns in the opposite direction in the IMU's axes."""
         if turn is None:
             self._falls, self._covariance = falls, 0.0
             self._variance += math.radians(BLIND_TURN_DEG) ** 2 * seconds
@@ -129,11 +129,11 @@ class AttitudeFilter:
         self._passed_s = seconds
 
     def _correct(self, sample: ImuSample) -> None:
-        """Turn the direction towards what the sample tells of it, and the bias with it, as far as that is surer."""
-        told = self._told(sample)
-        if told is None:
+        """Turn the direction towards that of the sample, and correct the bias, by how much surer the sample is."""
+        measured = self._measured(sample)
+        if measured is None:
             return
-        direction, sigma = told
+        direction, sigma = measured
         if self._falls is None:
             self._falls, self._variance = direction, sigma * sigma
             return
@@ -148,7 +148,7 @@ class AttitudeFilter:
         self._covariance *= 1.0 - gain
         self._variance *= 1.0 - gain
 
-    def _told(self, sample: ImuSample) -> Told | None:
+    def _measured(self, sample: ImuSample) -> Measured | None:
         """The direction by the orientation, else by the accelerometer, with its deviation in radians."""
         felt, oriented = self._felt(sample), _oriented(sample)
         if felt is not None and oriented is not None:
@@ -160,7 +160,7 @@ class AttitudeFilter:
             self.counts["norm" if _is_felt(sample) else "no_acceleration"] += 1
         return oriented or felt
 
-    def _felt(self, sample: ImuSample) -> Told | None:
+    def _felt(self, sample: ImuSample) -> Measured | None:
         """The direction against an acceleration, the less sure the more its norm differs from that of gravity.
 
         A norm of g + e is that of a push at a right angle by acos(g / (g + e)).
@@ -179,7 +179,7 @@ def _is_felt(sample: ImuSample) -> bool:
     return sample.acceleration is not None and bool(sample.acceleration.any())
 
 
-def _oriented(sample: ImuSample) -> Told | None:
+def _oriented(sample: ImuSample) -> Measured | None:
     """The direction by an orientation in a frame with z up."""
     if sample.orientation is None:
         return None
@@ -205,7 +205,7 @@ def _turned(v: Vector, rate: Vector, seconds: float) -> Vector:
 
 
 def _turn_between(a: Vector, b: Vector) -> Vector:
-    """The rotation vector in radians that turns one direction into another the shortest way."""
+    """The rotation vector in radians that turns one direction into another by the smallest angle."""
     x, y, z = _cross(a, b)
     sine = math.hypot(x, y, z)
     if sine < 1e-9:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whose word on gravity counts: that of an odometry or an IMU, or that of the picture."""
+"""The source of gravity: odometry, an IMU, or the picture."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ APART = 3.0  # deviations of both together: beyond, the picture took for level w
 
 
 class GravityChoice(NamedTuple):
-    """Up (3,) of length 1 in the camera frame or None, its confidence 0..1, who tells it, and who says otherwise.
+    """Up (3,) of length 1 in the camera frame or None, its confidence 0..1, its source, and the disagreement.
 
     ``source`` is ``imu``, ``picture``, ``odom`` or ``nothing``; ``disagreement_deg`` is the angle between the IMU's
     direction and the picture's, None where there are not both.
@@ -27,9 +27,9 @@ class GravityChoice(NamedTuple):
 
 
 def choose_gravity(up: Array, sigma_deg: float, seen: Array | None, confidence: float) -> GravityChoice:
-    """The surer one of what an IMU feels, ``up (3,)``, and what the picture shows, ``seen (3,)`` or None.
+    """The surer one of the IMU's direction, ``up (3,)``, and the picture's, ``seen (3,)`` or None.
 
-    Where they contradict each other, it is the IMU: no confidence of the picture tells a slope from a floor.
+    Where they contradict each other, it is the IMU: no confidence of the picture distinguishes a slope from a floor.
     """
     felt = gravity_confidence(sigma_deg)
     if seen is None:

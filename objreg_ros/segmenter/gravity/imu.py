@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An IMU beside the camera: what it feels, turned into the camera's optical frame."""
+"""An IMU beside the camera: its gravity, turned into the camera's optical frame."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Imu(AttitudeFilter):
 
     ``T_camera_imu`` is its pose in the camera's optical frame. Without one, ``find`` is asked for it. What that does
     not know either is the camera's own where both name one frame or none, and of no use where they name two: axes that
-    are guessed would turn the room over.
+    are guessed would turn the scene over.
     """
 
     def __init__(self, T_camera_imu: Array | None = None, find: FindPose = lambda camera, imu: None) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which way is up: the cluster of surface normals that best agrees with a prior.
+"""The direction of up: the cluster of surface normals that best agrees with a prior.
 
 Floors, tables and shelves all share one normal, so their normals form the largest cluster near the expected direction,
 even where no single plane dominates the frame. Up is minus gravity.
@@ -29,7 +29,7 @@ def camera_up(roll_deg: float) -> Array:
 
 
 def estimate_up(normals: Array, prior: Array, cone_deg: float) -> tuple[Array | None, float]:
-    """The direction up (3,) of length 1 in the camera frame and its confidence 0..1; (None, 0.0) if nothing tells it.
+    """The direction up (3,) of length 1 in the camera frame and its confidence 0..1; (None, 0.0) if none is found.
 
     ``normals (N, 3)`` of length 1, towards the camera. Only clusters within ``cone_deg`` of ``prior`` count; each is
     weighed by the fourth power of the cosine to the prior. The confidence is what the cluster's weight leads the best

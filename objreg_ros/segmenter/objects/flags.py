@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What holds for an object as a whole: whether something cuts it, and whether it is a patch of a wall."""
+"""The flags of an object as a whole: whether something cuts it, and whether it is a patch of a wall."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class Outline(NamedTuple):
 
 
 def cut_out(image: DepthImage, box: Box, mask: Outline, ground: Ground, params: SegmenterParams) -> Isolated:
-    """What ``mask`` of the picture covers within ``box``, taken at its word but for what is not measured.
+    """What ``mask`` of the picture covers within ``box``, taken as it is but for what is not measured.
 
     A pixel belongs to the mask by its cell, and by its depth: what the mask's edge takes of the background is left out
     as far as it is another cell's.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which parts of a surface are the object that a box shows.
+"""The parts of a surface that are the object in a box.
 
 The box is evidence: it encloses the object tightly, give or take some percent. So parts that leave the box belong to
 something else, and the right parts together fill it from edge to edge. What is only hidden by others is background.

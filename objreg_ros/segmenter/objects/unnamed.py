@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects without a name: what stands on a support or apart from everything, whatever the detector says.
 
-The cells that are of no support are connected as they are, and what is no thing as a whole is parted at its seams. A
-thing is as large as things are, and its border is its own: behind most of it the picture falls back, or it stands on a
-support there. What another surface hides, goes on without a step or leaves the picture is a piece of something else.
+The cells that are of no support are connected as they are. A component that is no object as a whole is parted at its
+seams. An object has the size of one, and its border is its own: behind most of it the picture falls back, or it stands
+on a support there. Occluded pieces, and those that go on without a step or leave the picture, are of something else.
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ from objreg_ros.segmenter.surface.support import Ground
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
 PERSON = "person"  # the label of what comes and goes
-MOST = 6  # things of a frame
+MOST = 6  # unnamed objects of a frame
 REACH = 3  # cells that a support is thought to go on, and in which what is beyond a border is looked for
 NEAR = np.float32(1.5)  # tolerances of a plane within which a cell is of it
-TOP = np.float32(0.1)  # m²: a level part of less may be the top of a thing
+TOP = np.float32(0.1)  # m²: a level part of less may be the top of an object
 LEAST_CELLS = 20  # of the coarse grid
 GROWTH = 3  # rounds that parts grow over seams
-LEAST_SIZE, MOST_SIZE = 0.04, 1.0  # m: the longest side of a thing
+LEAST_SIZE, MOST_SIZE = 0.04, 1.0  # m: the longest side of an object
 LEAST_WIDTH = 0.02  # m: 4 × cells / border, the side of a square as ragged
 LEAST_WIDTH_CELLS = 3.0
 LEAST_FILL = 0.35  # of the box around it
-LEAST_RISE = 1.0  # tolerances of a plane that a thing is higher than what it stands on, on average
-OWN = 0.7  # share of the border that is the thing's own
+LEAST_RISE = 1.0  # tolerances of a plane that an object rises above its support, on average
+OWN = 0.7  # share of the border that is the object's own
 MOST_OUTSIDE = 0.15  # share of the border at the picture's
 MOST_TAKEN = 0.1  # share that is of a named object
 MOST_PERSON = 0.5  # share within the box of a person
-BESIDE = 6  # cells around a thing that tell a patch of a wall
+BESIDE = 6  # cells around an object that are compared to find a patch of a wall
 SUMS = 12
 CELLS, DEPTH, TAKEN, SHOWN, HIDDEN, GOES_ON, OUTSIDE, STANDS, UNKNOWN, HEIGHT, BASE, BASES = range(SUMS)
 
 
 class Thing(NamedTuple):
-    """One thing: its ``pixels``, the ``flags`` of all of them, and which share of its border is its ``own``."""
+    """An unnamed object: its ``pixels``, the ``flags`` of all of them, and which share of its border is its ``own``."""
 
     pixels: Pixels
     flags: PointFlag
@@ -55,7 +55,7 @@ class Thing(NamedTuple):
 
 
 class _Surroundings(NamedTuple):
-    """What parts are looked at against: the cells (h, w) bool of supports and of named objects, and persons' boxes."""
+    """The surroundings of parts: cells (h, w) bool of supports and of named objects, and persons' boxes."""
 
     level: Array
     taken: Array
@@ -63,7 +63,7 @@ class _Surroundings(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A part that is a thing: ``chosen (h, w) bool`` of the cells of ``extent``, and which share of its border is its
+    """A part that is an object: ``chosen (h, w) bool`` of the cells of ``extent``, and which share of its border is its
     ``own``; ``stands`` whether it was seen to stand on a support."""
 
     chosen: Array
@@ -75,7 +75,7 @@ class Part(NamedTuple):
 def find_things(
     image: DepthImage, ground: Ground, taken: Array, people: Sequence[Box], params: SegmenterParams
 ) -> list[Thing]:
-    """At most MOST things, the most certain first.
+    """At most MOST unnamed objects, the most certain first.
 
     ``taken (h, w) bool`` are the cells of the whole frame that are of a named object, ``people`` the boxes of persons
     in pixels of the image.
@@ -88,7 +88,7 @@ def find_things(
     around = _Surroundings(level, taken, [box for box in people if not is_empty(box)])
     found = _things(whole, count, around, ground, jump)
     done = level.copy()
-    for one in found:  # what is a thing as a whole is not parted
+    for one in found:  # what is an object as a whole is not parted
         left, top, right, bottom = one.extent
         done[top:bottom, left:right] |= one.chosen
     parts, count = split(grid.depth, done, find_seams(grid, params.crease, jump), jump, LEAST_CELLS, GROWTH)
@@ -101,7 +101,7 @@ def find_things(
 def _level(ground: Ground) -> Array:
     """(h, w) bool of the coarse grid: the cells that are of a support, or near enough to one and on its plane.
 
-    Its small parts may be the tops of things.
+    Its small parts may be the tops of objects.
     """
     level = np.zeros(ground.coarse.depth.shape, np.bool_)
     for support in ground.supports:
@@ -152,7 +152,7 @@ def _mark_level(depth, x, y, parts, count, n, offset, level):  # type: ignore[no
 
 
 def _things(labels: Array, count: int, around: _Surroundings, ground: Ground, jump: tuple[float, float]) -> list[Part]:
-    """Those of the parts 1 … ``count`` of ``labels (h, w)`` that are things."""
+    """Those of the parts 1 … ``count`` of ``labels (h, w)`` that are objects."""
     grid = ground.coarse
     up = np.zeros(3, np.float32) if ground.up is None else ground.up.astype(np.float32)
     bounds = np.float32(jump[0]), np.float32(jump[1])

@@ -3,9 +3,9 @@
 
 Depth that was exposed before or after colour, or whose camera is not quite where its calibration says, is beside the
 colour by some pixels. A camera that turns by 100 degrees a second turns by 2.5 degrees in a lag of 25 ms. Both are a
-small rotation between the two cameras. It is the one under which depth steps lie upon the strongest gradients of grey:
+small rotation between the two cameras. It is the one that puts depth steps on the strongest gradients of grey:
 the alignment of depth and colour edges (Levinson and Thrun, "Automatic online calibration of cameras and lasers",
-2013), here for each frame by itself, with what earlier frames told as its prior.
+2013), here for each frame by itself, with the result of earlier frames as its prior.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M, depth_n
 
 WIDTH = 320  # px: the picture is halved until it is no wider
 POINTS = 1500  # most depth steps that are asked
-LEAST_POINTS = 400  # fewer tell nothing
+LEAST_POINTS = 400  # fewer give no result
 LEAST_STRENGTH = 0.2  # of the gradients at the steps, in deviations, for these to be edges; real ones have 0.3 to 1
 STEP = (3.0 * PLANE_TOLERANCE_M, 3.0 * PLANE_TOLERANCE_GROWTH)  # m and 1/m: depths that differ by more are a step
-SHADOW = 3  # px: the depth behind a step may be missing for as far; behind wider shadows it is another thing's
+SHADOW = 3  # px: the depth behind a step may be missing for as far; behind wider shadows it is another object's
 BLURS = (3.0, 1.5, 0.8)  # px of the reduced picture, coarse to fine
 COARSE = (np.linspace(-0.05, 0.05, 9), np.linspace(-0.04, 0.04, 5))  # rad: about x and y, about z
 STEPS = ((0.012, 0.006), (0.006, 0.003), (0.002, 0.001))  # rad, of each blur
 ROUNDS = 6  # most of a step
 BACKGROUND = 10.0  # px of the reduced picture: gradients are measured by the mean about them
-FIRST_SIGMA = 0.003  # rad: what may be off before frames insist on more; a lone frame with few things is led astray
-NOISE = np.array([0.0012, 0.0008, 0.0025])  # rad: standard deviation of what a frame tells, as in simulation
-INDEPENDENT = 0.1  # share of the depth steps that tell something of their own: neighbours say the same
-MOST_TOLD = 150.0  # by all of a frame
-SURPRISE = 3.0  # deviations: what differs by more is taken in as if it differed by as much
+FIRST_SIGMA = 0.003  # rad: the first guess of the spread; small, as a lone frame with few objects is misleading
+NOISE = np.array([0.0012, 0.0008, 0.0025])  # rad: standard deviation of a frame's rotation, as in simulation
+INDEPENDENT = 0.1  # share of the depth steps that are independent: neighbours agree
+MOST_TOLD = 150.0  # independent steps of a frame, at most
+SURPRISE = 3.0  # deviations: a larger difference is clipped to this
 MEMORY = 20  # frames that are remembered
-FIRST_FRAMES = 0.2  # that the first guess of the spread is worth
+FIRST_FRAMES = 0.2  # the weight of the first guess of the spread, in frames
 LEAST_AWAY = 0.1  # m before the camera, of a ray that is 1 m long along the other's axis: else it looks aside
 FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}  # fast arithmetic that still knows NaN
 MATCHED = 1.5  # noise of depth in a Kinect's: simulated and real Kinects have 0.9 to 1.4, a RealSense D435 1.8 and more
@@ -46,7 +46,7 @@ SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
 
 class Offset(NamedTuple):
-    """How depth is turned against colour in a frame, ``rotation (3,)`` rad; ``told`` where the frame itself says it."""
+    """How depth is turned against colour in a frame, ``rotation (3,)`` rad; ``told`` if the frame itself shows it."""
 
     rotation: Array
     told: bool
@@ -54,10 +54,10 @@ class Offset(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class DepthToColour:
-    """The offset of one stream; remembers what its frames told, until another camera comes.
+    """The offset of one stream; remembers the offsets of its frames, until another camera comes.
 
-    ``mean (3,)`` and ``spread (3,)`` rad are of the offsets that were told, in so many ``frames``. ``found (3,)`` rad
-    is what the last frame told by itself, None where it told nothing.
+    ``mean (3,)`` and ``spread (3,)`` rad are of the measured offsets, in so many ``frames``. ``found (3,)`` rad
+    is that of the last frame by itself, None where it has none.
     """
 
     mean: Array = field(default_factory=lambda: np.zeros(3))
@@ -67,7 +67,7 @@ class DepthToColour:
     _camera: tuple[Any, ...] | None = None
 
     def text(self) -> str:
-        """How depth is turned against colour, in words; empty where no frame told it."""
+        """How depth is turned against colour, as text; empty where no frame showed it."""
         if self.frames == 0:
             return ""
         mean, spread = (
@@ -83,7 +83,7 @@ class DepthToColour:
     def register(self, image: DepthImage) -> DepthImage:
         """The image with its depth brought upon its colour; itself where it has no colour or nothing is to be done.
 
-        Depth of a stereo camera is left as it is: its steps are half a matching window beside the things.
+        Depth of a stereo camera is left as it is: its steps are half a matching window beside the objects.
         """
         if image.rgb is None or is_matched(image):
             self.found = None
@@ -103,11 +103,11 @@ class DepthToColour:
         self._remember(found)
         share = (
             1.0 - NOISE**2 / self.spread**2
-        )  # of what is told that is no noise: frames that agree differ by it alone
+        )  # of the measured offset that is no noise: frames that agree differ by it alone
         return Offset(self.mean + share * (found - self.mean), True)
 
     def _remember(self, rotation: Array) -> None:
-        """Take a frame in: exponential means of the offset and of its square, the first guess worth `FIRST_FRAMES`."""
+        """Take a frame in: exponential means of the offset and of its square, the first guess weighs `FIRST_FRAMES`."""
         self.frames += 1
         known = FIRST_FRAMES + min(self.frames - 1, MEMORY)
         away = np.clip(rotation - self.mean, -SURPRISE * self.spread, SURPRISE * self.spread)
@@ -132,10 +132,10 @@ def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None
     rays = _steps(depth, *camera, *STEP)
     if len(rays) < LEAST_POINTS:
         return None
-    told = min(INDEPENDENT * len(rays), MOST_TOLD)
+    independent = min(INDEPENDENT * len(rays), MOST_TOLD)
     rays = np.ascontiguousarray(rays[:: len(rays) // POINTS + 1])
     grey = cv2.cvtColor(_shrunk(image.rgb, every), cv2.COLOR_RGB2GRAY).astype(np.float32)
-    weight = 1.0 / (np.sqrt(told) * spread)  # of the prior, in units of the score
+    weight = 1.0 / (np.sqrt(independent) * spread)  # of the prior, in units of the score
     camera, rotation, strength = _halfway(camera, every), np.array(mean, float), _strength(grey)
     for k, blur in enumerate(BLURS):
         picture = cv2.GaussianBlur(strength, (0, 0), blur)
@@ -155,7 +155,7 @@ def turned(image: DepthImage, rotation: Array) -> DepthImage:
 
 
 def warm(image: DepthImage) -> None:
-    """Compile or load every kernel: depth like a draughts board is put in the stead of the image's."""
+    """Compile or load every kernel: a draughts board of depth replaces the image's."""
     rows, columns = np.indices(image.depth.shape)
     board = np.where((rows // 16 + columns // 16) % 2, 1.0, 2.0).astype(np.float32)
     found = find_rotation(replace(image, depth=board), np.zeros(3), np.full(3, FIRST_SIGMA))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is odd about a frame that breaks no contract, in words that say what to do."""
+"""Oddities of a frame that breaks no contract, as text that says what to do."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from objreg_ros.segmenter.params import SegmenterParams
 
 
 def range_doubt(depth: DepthImage, view: View, params: SegmenterParams) -> str | None:
-    """A word where depth was measured, but none of it, by its ``view``, within the limits of ``params``; else None."""
+    """Text where depth was measured, but none of it, by its ``view``, within the limits of ``params``; else None."""
     if np.isfinite(view.xyz[..., 2]).any():
         return None
     z_min, z_max = params.z_min, params.limits[0]
@@ -30,7 +30,7 @@ def _within(measured: Array, z_min: float, z_max: float) -> bool:
 
 
 def registration_doubt(detections: Detections, depth: DepthImage) -> str | None:
-    """A word where boxes and depth have different frames, so are hardly registered; else None."""
+    """Text where boxes and depth have different frames, so are hardly registered; else None."""
     seen, measured = detections.frame_id, depth.frame_id
     if not len(detections) or not seen or not measured or seen == measured:
         return None

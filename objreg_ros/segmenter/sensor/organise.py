@@ -10,7 +10,7 @@ from objreg_ros.data import Array, DepthImage, Intrinsics, PointCloud
 FAR = 65.0  # metres; 65535 mm and 65535 m both mean "no depth"
 MIN_FIT = 30  # points that a fit of the intrinsics needs
 STEPS = (1, 2, 3, 4, 6, 8)  # pixels in each row and column that become one for a thinned cloud
-SAMPLE, NEAREST = 20000, 0.3  # points, and which share of them, that tell whether a cloud fills an image
+SAMPLE, NEAREST = 20000, 0.3  # points, and which share of them, by which a cloud fills an image or not
 IN_IMAGE = 0.4  # share of the points in front that a camera sees; half where depth sees wider than colour
 FILLED = 0.75  # share of these that have a point right of them, and below
 BEGUN = 0.9  # share of the points in every step-th column, and row, of a cloud that was thinned to these
@@ -98,7 +98,7 @@ def fit_intrinsics(xyz: Array, valid: Array) -> Intrinsics:
 
 
 def _error_px(xyz: Array, valid: Array, camera: Intrinsics) -> float:
-    """The median distance of pixels from where a camera sees their points; 0 where there are too few to tell."""
+    """The median distance of pixels from where a camera sees their points; 0 where there are too few of them."""
     step = max(1, int(np.sqrt(valid.size / SAMPLE)))
     rows, cols = np.nonzero(valid[::step, ::step])
     if len(rows) < MIN_FIT:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a stream tells of its own sensor: the noise of depth, how depth lies upon colour, and how late it is.
+"""What a stream shows of its own sensor: the noise of depth, how depth lies upon colour, and how late it is.
 
-Depth that shows the room of ``lag`` seconds before colour is turned against it by ``-lag`` times the angular velocity
+Depth that shows the scene of ``lag`` seconds before colour is turned against it by ``-lag`` times the angular velocity
 of the camera, beside what its calibration is wrong by. So the slope of the one over the other is the lag (Furgale,
 Rehder and Siegwart, "Unified temporal and spatial calibration for multi-sensor systems", 2013, estimate an offset in
 time like it). The angular velocity is that by which the picture moves from frame to frame, by phase correlation. It
-tells two axes, and what the camera's own way adds to them moves depth on colour as well.
+gives two axes, and what the camera's translation adds to them moves depth on colour as well.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from objreg_ros.sensor import measured_noise, thinned
 
 NOISE_EVERY = 10  # frames: so it costs a tenth of a millisecond of each
 NOISES = 100  # that are remembered
-PICTURE_WIDTH = 160  # px: to so many or more a picture is halved, to see how it moves
+PICTURE_WIDTH = 160  # px: the picture is reduced to this width or more, to measure its motion
 LEAST_RESPONSE = 0.1  # of a phase correlation, for the picture to have moved as a whole
-MOST_SHIFT = 0.05  # of the picture: as it rolls or moves by more, its shift says too little of that moment's offset
+MOST_SHIFT = 0.05  # of the picture: as it rolls or moves by more, its shift says too little of the offset at that time
 LONGEST_S = 0.25  # between two frames for a velocity; a hand that carries a camera turns back in half a second
 TURNS = 1000  # that are remembered
-LEAST_TURNS, LEAST_CLUSTERS = 30, 5  # for a lag to be told
+LEAST_TURNS, LEAST_CLUSTERS = 30, 5  # for a lag to be reported
 LEAST_VELOCITY = 0.1  # rad/s, its deviation: below, a lag of 10 ms is lost in what an offset errs by
-CLUSTER_S = 1.0  # what frames of so long err by is alike
+CLUSTER_S = 1.0  # frames within this time have similar errors
 OUTLIER = 3.0  # deviations, from the median of all: what differs by more counts in none of the rounds after
 ROUNDS = 5
-FLOOR_MS = 3.0  # what lags of simulated streams err by beyond what their scatter tells
-MOST_SIGMA_MS = 10.0  # a lag that is known less well is not told
+FLOOR_MS = 3.0  # the error of lags of simulated streams beyond their scatter
+MOST_SIGMA_MS = 10.0  # a lag that is known less well is not reported
 
 
 class Lag(NamedTuple):
@@ -44,7 +44,7 @@ class Lag(NamedTuple):
     sigma_ms: float
 
     def text(self) -> str:
-        """The lag in words."""
+        """The lag as text."""
         return f"{self.ms:.0f} +- {self.sigma_ms:.0f} ms"
 
 
@@ -59,7 +59,7 @@ class Turn(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class PictureMotion:
-    """How fast a picture moves about each frame: the mean of before and after, so it is told one frame later."""
+    """How fast a picture moves about each frame: the mean of before and after, so it is known one frame later."""
 
     _grey: Array | None = None
     _window: Array | None = None
@@ -79,7 +79,7 @@ class PictureMotion:
         grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
         seconds = 1e-9 * (image.stamp_ns - self._stamp_ns)
         same = self._grey is not None and self._grey.shape == grey.shape and 0.0 < seconds <= LONGEST_S
-        same = same and min(grey.shape) > 1  # of one row nothing is told
+        same = same and min(grey.shape) > 1  # one row shows no motion
         focal = np.array([image.intrinsics.fx, image.intrinsics.fy]) / every
         after = self._moved(grey, focal, seconds) if same else None
         before, self._before, self._grey, self._stamp_ns = self._before, after, grey, image.stamp_ns
@@ -138,7 +138,7 @@ class SensorEstimate:
         return registered
 
     def text(self) -> dict[str, str]:
-        """What is known, in words, by what `/diagnostics` calls it; without what no frame told."""
+        """The known values as text, by their keys in `/diagnostics`; without those that no frame showed."""
         noise, offset, lag = self.noise, self.depth_to_colour.text(), self.lag
         return {
             **({} if noise is None else {"depth noise (a Kinect v1 has 1)": f"{noise:.2f}"}),
@@ -147,7 +147,7 @@ class SensorEstimate:
         }
 
     def _note_turn(self, image: DepthImage) -> None:
-        """Put the offset of the frame before beside its velocity, which this frame tells."""
+        """Put the offset of the frame before beside its velocity, which is known with this frame."""
         velocity, found = self._motion.see(image), self.depth_to_colour.found
         if velocity is not None and self._waiting is not None:
             self._turns.append(Turn(self._waiting[0], velocity, self._waiting[1]))
@@ -160,7 +160,7 @@ class SensorEstimate:
 
     @property
     def noise(self) -> float | None:
-        """The noise of depth in that of a Kinect v1, the median of the last frames that told it; None before any."""
+        """The noise of depth in that of a Kinect v1, the median of the last frames with one; None before any."""
         return float(np.median(self._noises.copy())) if self._noises else None
 
     @property

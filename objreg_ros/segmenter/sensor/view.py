@@ -11,7 +11,7 @@ from objreg_ros import limits
 from objreg_ros.data import Array, DepthImage, Intrinsics, View
 
 BETWEEN = np.array([-1.0, 9.0, 9.0, -1.0]) / 16.0  # of four pixels: what is between the two in the middle
-LEAST_WIDTH = 160  # px: what a narrower view holds is too coarse to tell where a pose is
+LEAST_WIDTH = 160  # px: what a narrower view holds is too coarse to locate a pose
 
 
 def step_for(camera: Intrinsics, most: int) -> int:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What around a box is support surface: the cells within the noise of a level plane, fitted anew where the box is.
 
-A depth camera bends planes by some millimetres over the frame, so only a local fit tells a thin book from its table.
+A depth camera bends planes by some millimetres over the frame, so only a local fit parts a thin book from its table.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _equation(plane: Plane) -> tuple[Array, np.float32]:
 
 @numba.njit(cache=True, nogil=True)
 def _find_beneath(parts, total, normal, offset, window, grid, coarse_step, here):  # type: ignore[no-untyped-def]
-    """Fill ``here``: where a support may be what the things in ``window`` stand on; whether it is anywhere.
+    """Fill ``here``: where a support may be what the objects in ``window`` stand on; whether it is anywhere.
 
     A part that lies mostly in the window is a top of the object itself, unless more of its plane is seen around it, or
     nothing is seen below it.
@@ -136,7 +136,7 @@ def _any_row(mask, first, end, marks):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _share_below(normal, offset, grid):  # type: ignore[no-untyped-def]
-    """Which share of the cells lies well below a plane; around a tight box there are some where in it are none."""
+    """The share of the cells that lie well below a plane; around a tight box there are some where in it are none."""
     depth, x, y, _ = grid
     known, below = 0, 0
     for i in range(depth.shape[0]):

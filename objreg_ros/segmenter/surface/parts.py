@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of the connected parts in and around a box: size, place, and how they lie to each other."""
+"""Properties of the connected parts in and around a box: size, place, and how they lie to each other."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Seams between things: valleys where they touch, and small steps where one covers the other.
+"""Seams between objects: valleys where they touch, and small steps where one covers the other.
 
-Things are mostly convex, so the seam between two of them is mostly concave (Stein, Schoeler, Papon and Wörgötter,
+Objects are mostly convex, so the seam between two of them is mostly concave (Stein, Schoeler, Papon and Wörgötter,
 "Object partitioning using local convexity", CVPR 2014): with normals n and points p on both sides of a cell,
 (n_b - n_a)·(p_b - p_a) < 0 is a valley.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The surfaces that things stand on: every level plane of the frame, of whatever height."""
+"""The surfaces that objects stand on: every level plane of the frame, of whatever height."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Support:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """What the whole frame tells: the way up (3,) or None, its confidence, the support surfaces.
+    """What the whole frame gives: the direction up (3,) or None, its confidence, the support surfaces.
 
     ``surface`` is the whole frame in cells, ``coarse`` the grid of the supports, every other cell of it."""
 
