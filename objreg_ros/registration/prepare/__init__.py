@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is computed once a keyframe: `prepared` of its `views`, `fpfh` features, `normals` and `voxels`."""
+"""What is computed once a keyframe: `prepared` of its `views`, `keypoints`, `fpfh` features, `normals` and `voxels`."""
