@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A constraint as a BetweenFactorPose3 of GTSAM (`pip install gtsam`).
 
-Two things differ from ROS: GTSAM counts errors in the axes of *to*, and puts rotation before translation.
+Two conventions differ from ROS: GTSAM counts errors in the axes of *to*, and puts rotation before translation.
 `local_information` turns the axes and `rotation_first` the order. The poses of the graph are those of the camera here;
 `between_keyframes` moves a constraint to the poses of a body at your own keyframes.
 """
@@ -18,7 +18,7 @@ except ImportError:
 
 
 def factor(closure: LoopClosure, from_key: int, to_key: int) -> "gtsam.BetweenFactorPose3":
-    """The factor between the poses of the camera at the two moments."""
+    """The factor between the poses of the camera at the two keyframes."""
     information = local_information(Constraint(closure.T_from_to, closure.covariance))
     noise = gtsam.noiseModel.Gaussian.Information(rotation_first(information))
     return gtsam.BetweenFactorPose3(from_key, to_key, gtsam.Pose3(closure.T_from_to), noise)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A gate of one's own: it asks for one thing more than ours does, and says so where it refuses."""
+"""A gate of one's own: it has one more condition than ours, and says so where it refuses."""
 
 from collections.abc import Sequence
 

@@ -19,17 +19,17 @@ def main() -> None:
         seen = render(story.scenes[int(story.scene_of[k])], story.T_world_camera[k], seed=n, threads=2)
         camera = Camera(seen.intrinsics.fx, seen.intrinsics.fy, seen.intrinsics.cx, seen.intrinsics.cy)
         frame = segment(seen.rgb, seen.depth, camera, stamp_ns=n * 1_000_000_000 // RATE)
-        tell(registrar.process(frame))
-    tell(registrar.finish())
+        show(registrar.process(frame))
+    show(registrar.finish())
     print(registrar.counts())
     registrar.close()
 
 
-def tell(outcome) -> None:
+def show(outcome) -> None:
     """Print what became of a frame."""
     for closure in outcome.closures:
-        moments = f"{1e-9 * closure.from_ns:.1f} s and {1e-9 * closure.to_ns:.1f} s"
-        print(f"closed {moments} by {', '.join(closure.labels)}: {closure.T_from_to[:3, 3].round(3)} m")
+        times = f"{1e-9 * closure.from_ns:.1f} s and {1e-9 * closure.to_ns:.1f} s"
+        print(f"closed {times} by {', '.join(closure.labels)}: {closure.T_from_to[:3, 3].round(3)} m")
     for refusal in outcome.rejected:
         print(f"refused at {1e-9 * refusal.to_ns:.1f} s: {refusal.reason.value}, {refusal.detail}")
 

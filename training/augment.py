@@ -32,7 +32,7 @@ MOSAIC_GRIDS, MOSAIC_ZOOM = (2, 3, 4, 4, 5), (0.55, 2.5)
 """A grid of pieces with an object each is many times as much to learn from in the same time."""
 
 LABEL_WEIGHTS = np.array([0.9, 1.0, 1.0, 0.7, 0.5, 1.1, 2.6, 2.2, 1.1])
-"""How often the pieces show each label, in the order of the labels; small and thin things are harder to learn."""
+"""How often the pieces show each label, in the order of the labels; small and thin objects are harder to learn."""
 
 
 MISTAKE_GRIDS, MISTAKE_SHARE = (3, 3, 4), (0.6, 1.0)

@@ -67,7 +67,7 @@ class Told:
 
     @property
     def name(self) -> str:
-        """In words, as files are called."""
+        """As text, as files are called."""
         return f"{self.scenario}_{self.seed}_{self.sensor}_{self.rig}"
 
 
@@ -113,8 +113,8 @@ class Rows:
 
 def stories(first_seed: int) -> list[Told]:
     """Every scenario by every sensor, in every rig, each in a room of its own."""
-    told = [(scenario, sensor, rig) for rig in RIGS for scenario in SCENARIOS for sensor in SENSORS]
-    return [Told(*one, first_seed + k) for k, one in enumerate(told)]
+    chosen = [(scenario, sensor, rig) for rig in RIGS for scenario in SCENARIOS for sensor in SENSORS]
+    return [Told(*one, first_seed + k) for k, one in enumerate(chosen)]
 
 
 class Recorder:
@@ -167,14 +167,14 @@ def rows_of(
         yield (*pose_error(one.T_target_source, T_true), refused, pair, rank, *readings)
 
 
-def gather(told: Told) -> Rows:
+def gather(story: Told) -> Rows:
     """The rows of one recording, which is gone afterwards."""
     cv2.setNumThreads(1)
-    camera = camera_of(SENSORS[told.sensor][0], None)
-    sensors = sensors_of(camera, told.rig == "stress", RIGS[told.rig], told.sensor)
+    camera = camera_of(SENSORS[story.sensor][0], None)
+    sensors = sensors_of(camera, story.rig == "stress", RIGS[story.rig], story.sensor)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording"
-        simulate(path, told.scenario, told.seed, FRAMES, RATE, sensors=sensors, jpeg=True, threads=1)
+        simulate(path, story.scenario, story.seed, FRAMES, RATE, sensors=sensors, jpeg=True, threads=1)
         with open_recording(path) as recording:
             inputs = choose_inputs(recording.topics)
             params = RegistrarParams().replaced(**EAGER)
@@ -182,8 +182,8 @@ def gather(told: Told) -> Rows:
             registrar = Registrar(params, method=recorder, gate=recorder.judge)
             detecting = DetectorParams(model=share.EMBEDDED, threshold=THRESHOLD)
             detector = Detector(detecting, share.model(detecting.model))
-            rooms = Rooms(detector, Segmenter(SegmenterParams()), registrar, organise)
-            run_offline(recording.records(set(inputs.chosen().values())), rooms, inputs)
+            stages = Rooms(detector, Segmenter(SegmenterParams()), registrar, organise)
+            run_offline(recording.records(set(inputs.chosen().values())), stages, inputs)
             registrar.finish()
             registrar.close()
-    return recorder.rows(told.sensor)
+    return recorder.rows(story.sensor)

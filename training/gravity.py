@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far gravity errs that a single view tells, by its confidence: the numbers behind `sensor.SIGMA_DEG`.
+"""The error of gravity from a single view, by its confidence: the numbers behind `sensor.SIGMA_DEG`.
 
     python training/gravity.py            # some minutes; prints a table
 
 Rooms of every scenario are seen by every simulated sensor, with and without stress. The tilt of what the segmenter
-tells is compared with the truth. Real rooms are less level than simulated ones, so `SIGMA_DEG` is `MARGIN` times this.
+gives is compared with the truth. Real rooms are less level than simulated ones, so `SIGMA_DEG` is `MARGIN` times this.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ EDGES = (
 
 
 def tilts(seeds: int, frames: int) -> Iterator[tuple[float, float]]:
-    """The confidence and the squared tilt in degrees² of every view in which gravity was told."""
-    told = [(s, n, k) for s in SENSORS for n in SCENARIOS for k in range(seeds)]
-    for sensor, scenario, seed in tqdm(told, unit="room"):
+    """The confidence and the squared tilt in degrees² of every view that has gravity."""
+    runs = [(s, n, k) for s in SENSORS for n in SCENARIOS for k in range(seeds)]
+    for sensor, scenario, seed in tqdm(runs, unit="room"):
         name, depth = SENSORS[sensor]
         camera = CAMERAS[name]
         story, segmenter = make_story(scenario, seed + 500, frames), Segmenter()

@@ -31,7 +31,7 @@ from objreg_ros.registration.gate.likelihood import ODDS
 from objreg_ros.truth import FALSE, LOOSE
 from training.evidence import Rows, gather, stories
 
-PENALTY = 1e-3  # of squared weights: what is hardly told by the rows weighs little
+PENALTY = 1e-3  # of squared weights: what the rows hardly constrain weighs little
 LARGEST = 8.0  # natural logarithm that one step of a weight may have
 THRESHOLDS = (1.0, 3.0, 10.0, 30.0, ODDS, 100.0, 300.0)
 WRITTEN = Path(shipped.__file__)
@@ -66,9 +66,9 @@ def steps_of(readings: Array) -> tuple[Array, list[tuple[str, str]]]:
 def fit(rows: Rows) -> Fit:
     """The most likely weights of rows that are right or false; what is between is left out."""
     right, false = told_of(rows)
-    told = right | false
-    steps, names = steps_of(rows.readings[told])
-    sign, share = np.where(right[told], 1.0, -1.0), balanced(right[told])
+    known = right | false
+    steps, names = steps_of(rows.readings[known])
+    sign, share = np.where(right[known], 1.0, -1.0), balanced(right[known])
 
     def loss(x: Array) -> tuple[float, Array]:
         margin = sign * (steps @ x[:-1] + x[-1])
@@ -107,8 +107,8 @@ def log_odds(found: Fit, readings: Array) -> Array:
     """The decimal logarithm (N,) of the odds of readings (N, kinds)."""
     total = np.full(len(readings), found.prior)
     for (name, kind), values in zip(KINDS.items(), readings.T, strict=True):
-        told = np.interp(np.nan_to_num(values), kind.knots, found.weights[name])
-        total += np.where(np.isnan(values), found.unknown[name], told)
+        weight = np.interp(np.nan_to_num(values), kind.knots, found.weights[name])
+        total += np.where(np.isnan(values), found.unknown[name], weight)
     return total
 
 
@@ -208,9 +208,9 @@ def main() -> None:
 def gather_command(first_seed: int, out: Path, processes: int) -> None:
     """Simulate rooms by every sensor, and write what the gate sees; what is there already is left as it is."""
     out.mkdir(parents=True, exist_ok=True)
-    told = [one for one in stories(first_seed) if not (out / f"{one.name}.npz").exists()]
+    todo = [one for one in stories(first_seed) if not (out / f"{one.name}.npz").exists()]
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork")) as pool:
-        for one, rows in zip(told, tqdm(pool.map(gather, told), total=len(told), unit="recording"), strict=True):
+        for one, rows in zip(todo, tqdm(pool.map(gather, todo), total=len(todo), unit="recording"), strict=True):
             rows.save(out / f"{one.name}.npz")
 
 
@@ -228,8 +228,8 @@ def fit_command(folder: Path, write: bool, json_file: Path | None) -> None:
     for sensor in np.unique(rows.sensor):
         own = rows.sensor == sensor
         apart[own] = log_odds(fit(subset(rows, ~own)), rows.readings[own])
-        told = subset(rows, own)
-        shares = [float(reliability_at(told, odds, ODDS)) for odds in (log_odds(whole, told.readings), apart[own])]
+        its = subset(rows, own)
+        shares = [float(reliability_at(its, odds, ODDS)) for odds in (log_odds(whole, its.readings), apart[own])]
         click.echo(f"{sensor}: right poses accepted with it {shares[0]:.3f}, left out of the fit {shares[1]:.3f}")
         result[str(sensor)] = {"fitted": shares[0], "left_out": shares[1]}
     table = reliability(rows, apart)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cut out of the training pictures what a network still gets wrong: objects that it misses and things that it takes
+"""Cut out of the training pictures what a network still gets wrong: objects that it misses and what it takes
 for objects (after Sung and Poggio's bootstrapping, 1998, and Shrivastava et al., "Online Hard Example Mining", 2016).
 
 python -m training.mistakes DATA MISTAKES --model OUT/model.onnx
@@ -29,13 +29,13 @@ CROP_HW = (192, 256)
 """The size of what is cut out: most objects with their surroundings as large as they were."""
 
 SURROUNDINGS = 1.6
-"""Larger things are shrunk until the crop is so many times as large as they."""
+"""Larger objects are shrunk until the crop is so many times as large as they."""
 
 LEAST_AREA_PX = 28.0**2
 """Smaller ones are mostly a matter of luck."""
 
 BELOW, ABOVE = 0.5, 0.2
-"""An object that is scored lower is as good as missed; another thing that is scored higher is as good as found."""
+"""An object that is scored lower is as good as missed; anything else that is scored higher is as good as found."""
 
 MOST_A_PICTURE = 8
 

@@ -27,7 +27,7 @@ LEAST_REACH_PX = 6.0
 BOX_WEIGHT = 2.0
 
 CLASS_WEIGHTS = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 1.0)
-"""How much it counts to tell each label, in their order, from all else: flashlights and books are hardest to tell."""
+"""The weight of each label, in their order, against all else: flashlights and books are hardest to recognise."""
 
 NOTHING, WANTED, DIFFICULT = 0.0, 1.0, 2.0
 """The last number of a row of truth: padding, an object to find, an object neither to find nor to rule out."""

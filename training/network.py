@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A small MobileNet-SSD: depthwise separable convolutions (Howard et al., "MobileNets", 2017), five levels of SSD heads
 (Liu et al., "SSD", 2016), and a top-down path that gives the fine levels the context of the coarse ones (Lin et al.,
-"Feature Pyramid Networks", 2017), without which small objects have no surroundings to be told by.
+"Feature Pyramid Networks", 2017), without which small objects have no surroundings to be recognised by.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DEEPER = (0, 4, 3, 0, 0)
 HEAD_WIDTH = 96
 
 TOWERS_DEEPER = (1, 1, 1, 0, 0)
-"""So many end the tower of each level: small things are told by detail and context, and only here do both meet."""
+"""So many end the tower of each level: small objects are recognised by detail and context, which meet only here."""
 
 Enlarge = Callable[[Tensor, torch.Size], Tensor]
 """A map ``(B, C, h, w)`` and a size (H, W) to the map ``(B, C, H, W)`` of nearest neighbours."""

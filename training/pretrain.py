@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Teach the backbone to tell crops apart before it learns to find objects: twenty times cheaper than whole pictures,
+"""Teach the backbone to distinguish crops before it learns to find objects: twenty times cheaper than whole pictures,
 and a detector that starts from it learns within an hour what it would not learn from random weights.
 
     python -m training.pretrain --data DATA --out OUT/backbone.pt --steps 3000

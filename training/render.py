@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render shards of labelled pictures; stop it and start it again as you like.
+"""Render shards of labelled pictures; it can be stopped and started again.
 
 python -m training.render DATA --seed 1 --shards 160
 """

@@ -71,7 +71,7 @@ def plain_scene(rng: Rng) -> tuple[Scene, Array]:
 
 
 def hard_scene(rng: Rng) -> tuple[Scene, Array]:
-    """The same, but the rooms, three of four, are full of what is hardest to tell from other things, and of these."""
+    """The same, but the rooms, three of four, are full of what is hardest to distinguish, and of its look-alikes."""
     if rng.random() < 0.75:
         scene, poses = random_scene(_seed(rng), HARD_LABELS, rng.uniform(0.25, 0.55)), np.zeros((0, 4, 4))
     else:

@@ -180,7 +180,7 @@ def check(training: Training, arguments: argparse.Namespace) -> None:
         print(f"step {training.step}: {describe(validate_model(model, arguments.validation))}", flush=True)
 
 
-def parse(words: list[str]) -> argparse.Namespace:
+def parse(argv: list[str]) -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, required=True, help="folder of shards from training.render")
@@ -202,7 +202,7 @@ def parse(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--bf16", action="store_true", help="compute in bfloat16 where the processor is faster so")
     parser.add_argument("--freeze-stem", action="store_true", help="leave the first layers as they are")
     parser.add_argument("--seed", type=int, default=0)
-    return parser.parse_args(words)
+    return parser.parse_args(argv)
 
 
 def recipe(arguments: argparse.Namespace) -> str:

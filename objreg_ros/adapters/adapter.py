@@ -29,7 +29,7 @@ def require(kind: object, package: str, install: str) -> None:
 
 
 class Adapter(NodeBase):
-    """The books count constraints. A subclass fills in `hand_over`, and calls `listen_for_closures` when it is made."""
+    """It counts constraints. A subclass fills in `hand_over`, and calls `listen_for_closures` when it is made."""
 
     def __init__(self, name: str, *kinds: type[Params]) -> None:
         super().__init__(name, *kinds, AdapterParams)
@@ -147,7 +147,7 @@ class Adapter(NodeBase):
         return done
 
     def settle(self, key: Moments) -> None:
-        """The consumer has a constraint that was on its way, which may have been withdrawn meanwhile."""
+        """The consumer has a constraint that was in flight, which may have been withdrawn meanwhile."""
         closure = self.waiting.get(key)
         if closure is None:
             self._withdraw(key)

@@ -19,29 +19,29 @@ class Body:
 
     def __init__(self, node: NodeBase) -> None:
         params = node.settings.of(BodyParams)
-        self._told = params.mounting
+        self._mounting = params.mounting
         self._frame = params.base_frame
-        self._frames = transforms.receive_frames(node, self._told is None)
-        self._mount = transforms.Mount(self._told, self._frames, node.get_logger().info)
+        self._frames = transforms.receive_frames(node, self._mounting is None)
+        self._mount = transforms.Mount(self._mounting, self._frames, node.get_logger().info)
         self._remind = node.throttled.remind
 
     def T_body_camera(self, from_or_to: str, newest: Odometry | None = None) -> Array | None:
-        """The pose (4, 4) of a camera's frame on the body; None as long as nobody has said it.
+        """The pose (4, 4) of a camera's frame on the body; None while it is unknown.
 
-        ``newest`` is a word of odometry, whose body counts more than the parameter.
+        ``newest`` is a message of odometry, whose body counts more than the parameter.
         """
         body = newest.child_frame_id if newest is not None and newest.child_frame_id else self._frame
-        named = self._told is not None or from_or_to.lstrip("/") == body.lstrip("/")
+        named = self._mounting is not None or from_or_to.lstrip("/") == body.lstrip("/")
         if not named and self._frames.between(body.lstrip("/"), from_or_to.lstrip("/")) is None:
             self._remind(
-                "body", f"expected to know where {from_or_to!r} sits on {body!r}, got no word of it: constraints wait; "
+                "body", f"expected to know where {from_or_to!r} sits on {body!r}, got no transform: constraints wait; "
                 "publish it on /tf_static with tf2_msgs installed, or set T_base_camera (0 0 0 0 0 0 1 if they are one)"
             )  # fmt: skip
             return None
-        words = [Odometry(T_odom_body=np.eye(4), stamp_ns=0, child_frame_id=body)]
-        T = self._mount.T_body_camera(words, from_or_to)
+        odometry = [Odometry(T_odom_body=np.eye(4), stamp_ns=0, child_frame_id=body)]
+        T = self._mount.T_body_camera(odometry, from_or_to)
         return np.eye(4) if T is None else T
 
     def of(self, closure: LoopClosure, newest: Odometry | None = None) -> Array | None:
-        """That of the camera which saw the place again; None as long as nobody has said it."""
+        """That of the camera which saw the place again; None while it is unknown."""
         return self.T_body_camera(closure.to_frame_id, newest)

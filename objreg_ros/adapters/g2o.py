@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``objreg_to_g2o``: a file of odometry and constraints, whole at any moment, for whoever reads g2o's text."""
+"""``objreg_to_g2o``: a file of odometry and constraints, whole at any time, for whoever reads g2o's text."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class ToG2o(Adapter):
             self.end(key, anew.value)
 
     def hand_over(self, closure: LoopClosure) -> bool:
-        """An edge between the two nearest vertices, once odometry covers both moments."""
+        """An edge between the two nearest vertices, once odometry covers both keyframes."""
         T_body_camera = self._body.of(closure, self._odom.newest)
         if self._odom.newest is None or T_body_camera is None:
             return False
@@ -80,9 +80,9 @@ class ToG2o(Adapter):
         except ValueError as error:
             raise DroppedError("two_clocks", str(error)) from error
         if not tied and self._graph.in_gap(closure):
-            raise DroppedError("odometry_gap", "no odometry came around a moment of the constraint")
+            raise DroppedError("odometry_gap", "no odometry came around a keyframe of the constraint")
         if not tied and closure.from_ns < self._graph.odometry.stamps_ns[0]:
-            raise DroppedError("before_odometry", "odometry begins after the first moment of the constraint")
+            raise DroppedError("before_odometry", "odometry begins after the first keyframe of the constraint")
         self._has_news = tied or self._has_news
         return tied
 
@@ -126,8 +126,8 @@ class ToG2o(Adapter):
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """And what the file has."""
-        told = {"vertices": len(self._graph.keyframes), "constraints in the file": len(self._graph.closure_ties)}
-        return {**super().extra_diagnostics(), **told}
+        counts = {"vertices": len(self._graph.keyframes), "constraints in the file": len(self._graph.closure_ties)}
+        return {**super().extra_diagnostics(), **counts}
 
     def close(self) -> None:
         """Write what is new, then end."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``objreg_to_hydra``: edges between two moments on Hydra's topic ``external_loop_closures``.
+"""``objreg_to_hydra``: edges between two stamps on Hydra's topic ``external_loop_closures``.
 
-Hydra looks up the nearest of its own agent nodes for each moment, waits for it, and drops an edge where that is a
+Hydra looks up the nearest of its own agent nodes for each stamp, waits for it, and drops an edge where that is a
 second away or more (``max_time_difference``).
 """
 

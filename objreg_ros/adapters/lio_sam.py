@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``objreg_to_lio_sam``: pairs of moments for LIO-SAM, at the pace at which it takes them.
+"""``objreg_to_lio_sam``: pairs of stamps for LIO-SAM, at the pace at which it takes them.
 
 LIO-SAM drops pairs of less than 30 s and all but the last five that it has not looked at, and looks at one a second;
 its subscription keeps one and is best effort. So what is too near is dropped here, and the others go one a period.
@@ -23,7 +23,7 @@ TOPIC = "lio_loop/loop_closure_detection"
 
 
 class ToLioSam(Adapter):
-    """Tells LIO-SAM which of its keyframes to register."""
+    """Sends LIO-SAM which of its keyframes to register."""
 
     def __init__(self) -> None:
         super().__init__("objreg_to_lio_sam", ToLioSamParams)
@@ -40,7 +40,7 @@ class ToLioSam(Adapter):
         """Publish it, if LIO-SAM listens and is through with the last; `DroppedError` for a pair that is too near."""
         apart_s = 1e-9 * abs(closure.to_ns - closure.from_ns)
         if apart_s < self._pace.least_seconds:
-            text = f"expected moments at least {self._pace.least_seconds:g} s apart, got {apart_s:.3f} s"
+            text = f"expected keyframes at least {self._pace.least_seconds:g} s apart, got {apart_s:.3f} s"
             raise DroppedError("too_near", text)
         if not self._loops.get_subscription_count() or seconds() - self._sent_at < self._pace.period:
             return False

@@ -39,10 +39,10 @@ class ToRtabmapParams(Params):
     """How constraints find the nodes of RTAB-Map."""
 
     max_offset: float = param(
-        2.0, "a constraint is dropped where no node of RTAB-Map is nearer to one of its moments", unit="s", ge=0.001
+        2.0, "a constraint is dropped where no node of RTAB-Map is nearer to one of its keyframes", unit="s", ge=0.001
     )
     patience: float = param(
-        60.0, "a constraint waits so long for such nodes once RTAB-Map has told of any", unit="s", ge=0.1
+        60.0, "a constraint waits so long for such nodes once RTAB-Map has sent any", unit="s", ge=0.1
     )
     answer_within: float = param(10.0, "an add_link that is not answered by then is asked again", unit="s", ge=0.1)
     most_attempts: int = param(5, "a constraint is dropped after so many without an answer", ge=1)
@@ -53,7 +53,7 @@ class ToLioSamParams(Params):
     """What LIO-SAM can take."""
 
     least_seconds: float = param(
-        30.0, "pairs of moments nearer than this are dropped: LIO-SAM's historyKeyframeSearchTimeDiff", "s", ge=0.0
+        30.0, "pairs of keyframes nearer than this are dropped: LIO-SAM's historyKeyframeSearchTimeDiff", "s", ge=0.0
     )
     period: float = param(1.0, "between two constraints: one over LIO-SAM's loopClosureFrequency", unit="s", ge=0.01)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``objreg_to_rtabmap``: links between RTAB-Map's own nodes, by its service ``add_link``.
 
-A constraint waits for RTAB-Map and for the nodes around its moments. One link is on its way at a time; one that is not
-answered is asked again. RTAB-Map answers without a word, so what it refuses itself is in its log.
+A constraint waits for RTAB-Map and for the nodes around its keyframes. One link is in flight at a time; one that is not
+answered is asked again. RTAB-Map's answer is empty, so what it refuses itself is in its log.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ INSTALL = "apt install ros-$ROS_DISTRO-rtabmap-msgs"
 
 
 class _Asked(NamedTuple):
-    """The link that is on its way."""
+    """The link that is in flight."""
 
     key: Moments
     future: Future
@@ -68,7 +68,7 @@ class ToRtabmap(Adapter):
         self.listen(MapData, "mapData", self._on_map, qos.room(depth=10))
         self.listen_for_closures()
 
-    # What RTAB-Map and odometry tell
+    # What RTAB-Map and odometry send
 
     def _follow(self, odometry: Odometry) -> None:
         self._odometry.append(odometry.stamp_ns, odometry.T_odom_body)
@@ -119,10 +119,10 @@ class ToRtabmap(Adapter):
             self._wants_graph = False
             self._on_map(future.result().data)
 
-    # What it is told
+    # What it receives
 
     def hand_over(self, closure: LoopClosure) -> bool:
-        """Ask for the link, if no other is on its way and the nodes are known; it is settled by the answer."""
+        """Ask for the link, if no other is in flight and the nodes are known; it is settled by the answer."""
         if self._asked is not None or not len(self._nodes):
             return False
         T_base_camera = self._body.of(closure, self._odom.newest)
@@ -134,16 +134,16 @@ class ToRtabmap(Adapter):
             return False
         from_id, to_id, constraint = tied
         if from_id == to_id:
-            raise DroppedError("same_node", f"both moments are nearest to node {from_id} of RTAB-Map")
+            raise DroppedError("same_node", f"both keyframes are nearest to node {from_id} of RTAB-Map")
         request = AddLink.Request()
         fill_link(request.link, constraint, from_id, to_id)
         self._ask(closure.moments, request)
         return False
 
     def _offset_s(self, closure: LoopClosure) -> float:
-        """How far the worse of the two moments is from its node."""
-        moments = closure.from_ns, closure.to_ns
-        return 1e-9 * max(abs(self._nodes.nearest(stamp_ns).stamp_ns - stamp_ns) for stamp_ns in moments)
+        """How far the worse of the two keyframes is from its node."""
+        stamps_ns = closure.from_ns, closure.to_ns
+        return 1e-9 * max(abs(self._nodes.nearest(stamp_ns).stamp_ns - stamp_ns) for stamp_ns in stamps_ns)
 
     def _has_nodes(self, closure: LoopClosure) -> bool:
         return self._offset_s(closure) <= self._limits.max_offset
@@ -154,10 +154,10 @@ class ToRtabmap(Adapter):
         if seconds() - since < self._limits.patience:
             return
         if self._has_nodes(closure):
-            raise DroppedError("no_way", "neither odometry nor nodes of one map lead from its moments to their nodes")
+            raise DroppedError("no_way", "neither odometry nor nodes of one map lead from its keyframes to their nodes")
         raise DroppedError(
             "no_node",
-            f"expected nodes of RTAB-Map within {self._limits.max_offset:g} s of both moments, got one "
+            f"expected nodes of RTAB-Map within {self._limits.max_offset:g} s of both keyframes, got one "
             f"{self._offset_s(closure):.3f} s away",
         )
 

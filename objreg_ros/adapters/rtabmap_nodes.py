@@ -23,7 +23,7 @@ WANDERING = MapperParams().odometry_sigmas
 
 
 class RtabmapNode(NamedTuple):
-    """One node: ``T_odom_base (4, 4)`` as odometry told it, which counts in its own map only."""
+    """One node: ``T_odom_base (4, 4)`` as odometry gave it, which counts in its own map only."""
 
     stamp_ns: int
     number: int
@@ -32,7 +32,7 @@ class RtabmapNode(NamedTuple):
 
 
 class RtabmapNodes:
-    """All that ``mapData`` has told of. A number that comes with another stamp is of another database."""
+    """All nodes that ``mapData`` has sent. A number that comes with another stamp is of another database."""
 
     def __init__(self) -> None:
         self._nodes: dict[int, RtabmapNode] = {}
@@ -78,12 +78,12 @@ class RtabmapNodes:
         return min(self._around(stamp_ns), key=lambda node: abs(node.stamp_ns - stamp_ns))
 
     def _around(self, stamp_ns: int) -> list[RtabmapNode]:
-        """The last node before a moment and the first one that is not; one of them at either end."""
+        """The last node before a stamp and the first one that is not; one of them at either end."""
         k = bisect_left(self._order, (stamp_ns, 0))
         return [self._nodes[number] for _, number in self._order[max(k - 1, 0) : k + 1]]
 
     def way(self, stamps_ns: Iterable[int]) -> Trajectory | None:
-        """Odometry by the nodes around some moments, straight between two; None where these do not enclose one."""
+        """Odometry by the nodes around some stamps, straight between two; None where these do not enclose one."""
         poses: dict[int, Array] = {}
         for stamp_ns in stamps_ns:
             nearest, around = self.nearest(stamp_ns), self._around(stamp_ns)
@@ -101,24 +101,24 @@ class RtabmapNodes:
     def tied(
         self, closure: LoopClosure, odometry: SparseTrajectory, T_base_camera: Array
     ) -> tuple[int, int, Constraint] | None:
-        """The nodes nearest to the closure's moments, and the constraint between their base frames.
+        """The nodes nearest to the closure's stamps, and the constraint between their base frames.
 
-        By ``odometry`` where it covers the ways from the moments to the nodes and was not silent on them, else by the
-        nodes around the moments. None where neither does (yet).
+        By ``odometry`` where it covers the paths from the stamps to the nodes and was not silent on them, else by the
+        nodes around the stamps. None where neither does (yet).
         """
         k1, k2 = self.nearest(closure.from_ns), self.nearest(closure.to_ns)
-        moments = (closure.from_ns, closure.to_ns)
-        ways = zip(moments, (k1.stamp_ns, k2.stamp_ns), strict=True)
-        covered = all(_is_known(odometry, *sorted(ends)) for ends in ways)
-        way: Trajectory | None = odometry if covered else self.way(moments)
-        if way is None:
+        stamps_ns = (closure.from_ns, closure.to_ns)
+        spans = zip(stamps_ns, (k1.stamp_ns, k2.stamp_ns), strict=True)
+        covered = all(_is_known(odometry, *sorted(ends)) for ends in spans)
+        path: Trajectory | None = odometry if covered else self.way(stamps_ns)
+        if path is None:
             return None
-        between = between_keyframes(closure, (way, way), (k1.stamp_ns, k2.stamp_ns), T_base_camera, WANDERING)
+        between = between_keyframes(closure, (path, path), (k1.stamp_ns, k2.stamp_ns), T_base_camera, WANDERING)
         return k1.number, k2.number, between
 
 
 def _is_known(odometry: SparseTrajectory, first_ns: int, last_ns: int) -> bool:
-    """Whether odometry leads from a moment to another: in a silence between them it may have begun anew."""
+    """Whether odometry leads from one stamp to another: in a silence between them it may have begun anew."""
     return odometry.covers(first_ns) and odometry.covers(last_ns) and odometry.silent_s(first_ns, last_ns) == 0.0
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What passes between tracking and the search: the frames of one moment, or the keyframe that another machine made."""
+"""What passes between tracking and the search: the frames of one time, or the keyframe that another machine made."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Clock(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FrameWindow:
-    """Frames of one moment: ``T_first_frame`` maps the camera of each frame into that of the first.
+    """Frames that are close in time: ``T_first_frame`` maps the camera of each frame into that of the first.
 
     ``T_session_first`` is the pose of the first camera in the frame of its session: the odometry's, or our own
     tracking's where odometry had a gap or there is none; ``by_odometry`` says which. ``session`` counts and changes
@@ -73,7 +73,7 @@ class FrameWindow:
 
     @property
     def doubt(self) -> str:
-        """Why its camera is not what it says; empty where nothing speaks against it."""
+        """Why its camera is not what it says; empty where there is no doubt."""
         return next((frame.doubt for frame in self.frames if frame.doubt), "")
 
     @property
@@ -99,7 +99,7 @@ def alone(frame: Frame) -> Frame:
 
 
 def with_gravity_of(gravity_filter: GravityFilter, T_session_frame: Array, frame: Frame) -> Frame:
-    """The frame with gravity as a filter tells it that knows of the frame too."""
+    """The frame with the gravity of a filter that knows of the frame too."""
     gravity, weight = gravity_filter.update(T_session_frame, frame.gravity, frame.gravity_confidence)
     return replace(frame, gravity=gravity, gravity_confidence=weight)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which way things fall, as all frames of a session tell it together.
+"""The direction of gravity from all frames of a session together.
 
 A single view takes it from the surfaces that it sees, and depth is warped: two views of one room differ by a degree,
-some by four. But gravity is one, and odometry carries what earlier views told to where the camera is now.
+some by four. But gravity is one, and odometry carries the estimates of earlier views to where the camera is now.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ class GravityFilter:
     _path: TravelledPath | None = None
 
     def update(self, T_session_camera: Array, gravity: Array | None, confidence: float) -> tuple[Array | None, float]:
-        """Go to a pose and take in what its view tells, None for nothing.
+        """Go to a pose and take in the gravity of its view, None where it has none.
 
-        Returns gravity (3,) of length 1 in the camera frame and its weight 0..1; (None, 0.0) where nothing told it yet.
+        Returns gravity (3,) of length 1 in the camera frame and its weight 0..1; (None, 0.0) where no view gave it yet.
         """
         kept = self._go(T_session_camera)
-        told = np.zeros(3) if gravity is None else confidence**DOUBT * (T_session_camera[:3, :3] @ gravity)
-        self._gravity_sum = kept * self._gravity_sum + (1.0 - kept) * told
-        falls = self._gravity_sum + ONE_VIEW * told
+        seen = np.zeros(3) if gravity is None else confidence**DOUBT * (T_session_camera[:3, :3] @ gravity)
+        self._gravity_sum = kept * self._gravity_sum + (1.0 - kept) * seen
+        falls = self._gravity_sum + ONE_VIEW * seen
         weight = float(np.linalg.norm(falls))
         if weight < 1e-6:
             return None, 0.0
@@ -51,7 +51,7 @@ class GravityFilter:
         self._gravity_sum, self._path = np.zeros(3), None
 
     def _go(self, T_session_camera: Array) -> float:
-        """What is kept of all that was told, after going on to a pose; all of it where that is as good as at rest."""
+        """The share of the sum that is kept after going on to a pose; all of it where that is as good as at rest."""
         path = self._path = self._path or TravelledPath(T_session_camera)
         if path.is_near(T_session_camera, AT_REST_M, AT_REST_DEG):
             return 1.0

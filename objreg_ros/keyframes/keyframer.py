@@ -58,7 +58,7 @@ class _Session:
         return 1e-9 * (frame.stamp_ns - self.last_ns)
 
     def lose(self, seconds: float, max_speed: float) -> None:
-        """After a long silence nobody knows the way there, nor which way things fall."""
+        """After a long silence neither the path so far nor the direction of gravity is known."""
         self.path.lose(seconds, max_speed)
         self.gravity_filter.forget()
 
@@ -74,7 +74,7 @@ class _Session:
 
 
 def _with_session_gravity(session: _Session, frame: Frame) -> Frame:
-    """The frame with gravity as all views of the session tell it, or its own where odometry does not carry that.
+    """The frame with the gravity of all views of the session, or its own where odometry does not carry that.
 
     Our own tracking slips unnoticed, and what it carries then is wrong.
     """
@@ -187,7 +187,7 @@ class Keyframer:
         return ended
 
     def _begin(self, session: _Session, frame: Frame, T_session_frame: Array) -> None:
-        """Begin a frame window with this frame. The way there counts whether or not it becomes a keyframe."""
+        """Begin a frame window with this frame. The path there counts whether or not it becomes a keyframe."""
         session.first = frame
         session.path.go(T_session_frame)
         self._open = _Open(session, frame, tracked_surface(frame.view), T_session_frame)
@@ -245,7 +245,7 @@ class Keyframer:
         return found
 
     def _may_come_back(self, session: _Session, frame: Frame) -> bool:
-        """Whether odometry is only a moment late: such a frame is passed over."""
+        """Whether odometry is only a little late: such a frame is passed over."""
         return session.in_odometry and 1e-9 * (frame.stamp_ns - session.last_ns) < self.params.keyframe_seconds
 
     def _collect(self, window: _Open, frame: Frame, T_first_frame: Array) -> None:
@@ -257,7 +257,7 @@ class Keyframer:
             window.motions.append(T_first_frame)
 
     def _is_over(self, frame: Frame, T_session_frame: Array) -> bool:
-        """Whether the frame is of another moment, or odometry is back: it tells no motion from a pose of our own."""
+        """Whether the frame is of another time, or odometry is back: it gives no motion from a pose of our own."""
         window = self._open
         if window is None:
             return False

@@ -37,7 +37,7 @@ WAITING = Limit(8, 200_000_000, math.inf)  # keyframes that wait to be fused and
 class KeyframerNode(FramesNode):
     """Follows every frame of one camera, and sends the keyframes that come of them.
 
-    A frame that completes a keyframe is in the books until that was sent. What was sent is kept for who was away.
+    A frame that completes a keyframe counts as waiting until that was sent. What was sent is kept for who was away.
     """
 
     def __init__(self, bus: IntraProcessBus | None = None) -> None:

@@ -15,7 +15,7 @@ TURNS_DEG_S = 360.0  # nothing turns faster for long
 
 @dataclass(slots=True, eq=False)
 class TravelledPath:
-    """The camera's way through a session, from ``T_session_camera`` on: how far it has gone and turned until now."""
+    """The camera's path through a session, from ``T_session_camera`` on: how far it has gone and turned until now."""
 
     T_session_camera: Array
     travelled: float = 0.0

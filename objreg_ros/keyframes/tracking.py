@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The motion between two moments from their views, for frames that come without odometry.
+"""The motion between two frames from their views, for frames that come without odometry.
 
 The views are aligned densely: projective data association and point-to-plane error (Newcombe et al., "KinectFusion",
 2011) together with the error of the grey (Steinbrücker et al., "Real-time visual odometry from dense RGB-D images",
@@ -83,7 +83,7 @@ def view_motion(source: View, target: TrackedSurface, T_target_source: Array | N
 def same_picture(source: View, target: TrackedSurface, T_target_source: Array) -> float:
     """The correlation of the views' grey where one lies upon the other, -1 to 1; 0 where too little does.
 
-    1, too, where what is left is noise, or nothing tells: one has no grey. Surfaces alone agree at other places too: a
+    1, too, where what is left is noise, or one has no grey. Surfaces alone agree at other places too: a
     wall slides along itself.
     """
     if source.grey is None or not target.has_grey:

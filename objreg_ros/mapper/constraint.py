@@ -37,13 +37,13 @@ def between_keyframes(
 ) -> Constraint:
     """The closure as a constraint between the bodies at a consumer's own keyframes, near *from* and near *to*.
 
-    ``T_k1_k2 = O(k1)^-1 O(from) T_from_to O(to)^-1 O(k2)`` with O the odometry of the camera at the closure's moments
+    ``T_k1_k2 = O(k1)^-1 O(from) T_from_to O(to)^-1 O(k2)`` with O the odometry of the camera at the closure's stamps
     and of the body at the keyframes; that of *from* and that of *to*, which may be two sessions, or of two robots with
     two cameras on them. ``sigmas`` m and rad are how it wanders over one metre or one radian: a closure is known less
-    well where it was not measured. ValueError for a moment that odometry does not cover.
+    well where it was not measured. ValueError for a stamp that odometry does not cover.
     """
     (of_from, of_to), (k1_ns, k2_ns) = odometry, keyframes_ns
-    T_k1_body = inverse(of_from.at(k1_ns)) @ of_from.at(closure.from_ns)  # at the closure's moments
+    T_k1_body = inverse(of_from.at(k1_ns)) @ of_from.at(closure.from_ns)  # at the closure's stamps
     T_k2_body = inverse(of_to.at(k2_ns)) @ of_to.at(closure.to_ns)
     measured = Constraint(closure.T_from_to, closure.covariance)
     T_body_from, T_body_to = T_body_camera if isinstance(T_body_camera, tuple) else (T_body_camera, T_body_camera)
@@ -66,9 +66,9 @@ def rotation_vectors(R: Array) -> Array:
 
 
 def wandering(T_motion: Array, sigmas: tuple[float, float]) -> Array:
-    """The covariance (6, 6) of a motion by odometry whose errors, in m and rad, grow with the root of the way."""
-    way = float(np.linalg.norm(T_motion[:3, 3])) + rotation_angle(T_motion[:3, :3])
-    return np.diag(way * np.repeat(np.square(sigmas) / 3, 3))
+    """The covariance (6, 6) of a motion by odometry whose errors, in m and rad, grow with the root of the path."""
+    path = float(np.linalg.norm(T_motion[:3, 3])) + rotation_angle(T_motion[:3, :3])
+    return np.diag(path * np.repeat(np.square(sigmas) / 3, 3))
 
 
 def floored(covariance: Array, sigmas: tuple[float, float]) -> Array:
@@ -90,7 +90,7 @@ def freed(constraint: Constraint, sigmas: tuple[float, float], ends: tuple[bool,
 
 
 def unseen(seconds: float, max_speed: float) -> Array:
-    """The covariance (6, 6) of a motion of which nothing was told for so long: to anywhere that a body gets, any turn.
+    """The covariance (6, 6) of a motion that was not reported for so long: to anywhere that a body gets, any turn.
 
     Odometry that is silent for a while may have begun anew meanwhile.
     """

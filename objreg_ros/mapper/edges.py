@@ -50,7 +50,7 @@ def edges_of(rows: Sequence[tuple[int, int, Constraint]]) -> Edges:
 
 
 def _whitenings(covariances: Array) -> Array:
-    """(m, 6, 6) W with ``W C W^T = 1``, by way of correlations: what is known to microns and to kilometres goes too."""
+    """(m, 6, 6) W with ``W C W^T = 1``, through correlations: what is known to microns and to kilometres goes too."""
     sigmas = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     correlations = covariances / (sigmas[:, :, None] * sigmas[:, None, :]) + LEAST_FREEDOM * np.eye(6)
     return np.linalg.inv(np.linalg.cholesky(correlations)) / sigmas[:, None, :]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The odometry of one robot on its way into the graph."""
+"""The odometry of one robot before it enters the graph."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from objreg_ros.mapper.restart import Admitted, Restart
 class Follower:
     """Follows what is admitted; ``on_leap`` is called for every pose that leapt and came back.
 
-    ``robot`` is its name in the graph. ``has_news``: a keyframe or a solution came that nobody was told of yet.
+    ``robot`` is its name in the graph. ``has_news``: a keyframe or a solution came that is not published yet.
     """
 
     def __init__(self, robot: str, max_speed: float, on_leap: Callable[[], None]) -> None:
@@ -21,7 +21,7 @@ class Follower:
         self.newest: Odometry | None = None
         self.has_news = False
         self._count = self._passed_over_count = 0
-        self._ended_ns = 0  # the last moment of the run of the clock before this one
+        self._ended_ns = 0  # the last stamp of the run of the clock before this one
         self.forget(max_speed)
 
     def forget(self, max_speed: float) -> None:
@@ -55,9 +55,9 @@ class Follower:
         return is_alone and session is not None and not graph.sessions[session].names
 
     def is_of_old_run(self, stamp_ns: int) -> bool:
-        """Whether what ends at a moment was found before time jumped back: the registrar searches for a while.
+        """Whether what ends at a stamp was found before time jumped back: the registrar searches for a while.
 
-        It speaks of what was, so what is of this run does not end long after the newest odometry.
+        It concerns the past, so what is of this run does not end long after the newest odometry.
         """
         return self.newest is not None and self.newest.stamp_ns + JUMP_NS < stamp_ns <= self._ended_ns
 
@@ -79,7 +79,7 @@ class Followers(dict[str, Follower]):
         return [self[robot]] if robot in self else list(self.values())
 
     def share_frame(self, follower: Follower) -> bool:
-        """Whether another robot's odometry is in a frame of the same name, of which TF can tell but one place."""
+        """Whether another robot's odometry is in a frame of the same name, of which TF can give but one place."""
         frames = [one.newest.frame_id for one in self.values() if one is not follower and one.newest is not None]
         return follower.newest is not None and follower.newest.frame_id in frames
 

@@ -28,7 +28,7 @@ class MissingError(ImportError, ValueError):
 
 
 def load() -> Any:
-    """GTSAM, imported now: it takes a moment, in which nothing else runs. `MissingError` where it is not installed."""
+    """GTSAM, imported now: it takes some time, in which nothing else runs. `MissingError` where it is not installed."""
     try:
         return import_module("gtsam")
     except ImportError as error:

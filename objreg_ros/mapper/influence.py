@@ -15,7 +15,7 @@ from objreg_ros.mapper.incremental import IncrementalGraph
 class Influence:
     """Of closures on each other, by their ``numbers``, in a solved graph.
 
-    One look at the graph tells all of it: that of forty nodes takes no more than twice as long as that of two.
+    One pass over the graph finds all of it: that of forty nodes takes no more than twice as long as that of two.
     """
 
     def __init__(self, graph: IncrementalGraph, poses: Array, closures: Edges, numbers: Sequence[int]) -> None:

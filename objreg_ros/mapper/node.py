@@ -43,7 +43,7 @@ LOOK_S = 0.1  # between two looks at whether the path is due
 
 
 class MapperNode(NodeBase):
-    """Keeps the pose graph, solves it whenever a closure came in. The books count closures.
+    """Keeps the pose graph, solves it whenever a closure came in. It counts closures.
 
     The worker solves a snapshot, so that odometry never waits; ``_graph_lock`` guards what both threads touch.
     """
@@ -60,9 +60,9 @@ class MapperNode(NodeBase):
         self._saved_file = saved.beside(self._graph_file)
         require_ours(self._saved_file)
         self._withdrawn_count = 0
-        self._riding: list[int] = []  # moments of jobs that the next solution settles too
+        self._riding: list[int] = []  # stamps of jobs that the next solution settles too
         self._path_due_s = 0.0
-        self._shared_frames = set[str]()  # of which the log has told
+        self._shared_frames = set[str]()  # of which the log has warned
         self._followers = Followers()
         mount = receive_mount(self, self._inputs.mounting)
         self._waiting = Waiting(self._followers, mount.T_body_camera, qos.KEPT_CONSTRAINTS)
@@ -92,7 +92,7 @@ class MapperNode(NodeBase):
         self._summary = Summary() if graph is None else graph.optimise()
 
     def _start_anew(self, reason: str) -> None:
-        """An empty map; the closures that wait are about moments of the old one, and are dropped."""
+        """An empty map; the closures that wait are of keyframes of the old one, and are dropped."""
         with self._graph_lock:
             self._begin()
         self._closures.forget_all()
@@ -138,13 +138,13 @@ class MapperNode(NodeBase):
     def _begin_elsewhere(self, follower: Follower, anew: Anew, stamp_ns: int) -> None:
         """Time jumped back (a looped bag, a simulation begun anew), or odometry was started again elsewhere.
 
-        Where that is on the map only closures can tell. Where they do not name their sessions, those of a clock that
+        Only closures can say where that is on the map. Where they do not name their sessions, those of a clock that
         runs again would be of both runs: that is a new map, unless other robots are in it.
         """
         if anew is Anew.TIME:
             back_s, is_new = follower.jump_back(stamp_ns), follower.is_confusable(self._graph)
-            told = "a new map" if is_new else "another session of the map"
-            self.get_logger().warning(f"time jumped back by {back_s:.3f} s: {told}")
+            what = "a new map" if is_new else "another session of the map"
+            self.get_logger().warning(f"time jumped back by {back_s:.3f} s: {what}")
             if is_new:
                 self._start_anew(anew.value)
                 return
@@ -166,10 +166,10 @@ class MapperNode(NodeBase):
             self._waiting.closures.append(closure)
             self._tie_what_waits()
 
-    def _leave(self, closure: LoopClosure, reason: str, words: str = "") -> None:
-        """Drop a closure; told again, it is a new one."""
+    def _leave(self, closure: LoopClosure, reason: str, text: str = "") -> None:
+        """Drop a closure; received again, it is a new one."""
         self._closures.forget(closure)
-        self.drop(closure.to_ns, reason, words)
+        self.drop(closure.to_ns, reason, text)
 
     def _learn(self, closure: LoopClosure) -> None:
         """A closure that is known names its sessions."""
@@ -191,9 +191,9 @@ class MapperNode(NodeBase):
     def _tie_what_waits(self) -> None:
         with self._graph_lock:
             fates = self._waiting.tie(self._graph)
-        for closure, reason, words in fates:
+        for closure, reason, text in fates:
             if reason:
-                self._leave(closure, reason, words)
+                self._leave(closure, reason, text)
             else:
                 self.worker.put((closure.to_ns, closure))
 
@@ -226,7 +226,7 @@ class MapperNode(NodeBase):
         return payload is not None
 
     def _without_withdrawn(self, problem: Problem) -> Solution | None:
-        """A solution that no closure waits for, so that no drop tells of what goes wrong; None then."""
+        """A solution that no closure waits for, so that no drop reports what goes wrong; None then."""
         try:
             return problem.solve()
         except (RuntimeError, ValueError) as error:
@@ -237,19 +237,19 @@ class MapperNode(NodeBase):
 
     def _publish_paths(self) -> None:
         """The paths and the graph, where something is new and writing the last ones is not long enough ago."""
-        told = {f: f.newest.stamp_ns for f in self._followers.values() if f.has_news and f.newest is not None}
-        if not self.is_active or not told or time.monotonic() < self._path_due_s:
+        news = {f: f.newest.stamp_ns for f in self._followers.values() if f.has_news and f.newest is not None}
+        if not self.is_active or not news or time.monotonic() < self._path_due_s:
             return
         begun = time.monotonic()
         with self._graph_lock:
-            for follower in told:
+            for follower in news:
                 follower.has_news = False
-            placed = {f for f in told if self._graph.T_map_odom_of(f.robot) is not None}
-            paths = [(f.robot, self._graph.path(f.robot) if f in placed else [], told[f]) for f in told]
+            placed = {f for f in news if self._graph.T_map_odom_of(f.robot) is not None}
+            paths = [(f.robot, self._graph.path(f.robot) if f in placed else [], news[f]) for f in news]
             edges = self._graph.edges()
         for path in paths:
             self._out.path(*path)
-        self._out.graph(*edges, max(told.values()))
+        self._out.graph(*edges, max(news.values()))
         self._path_due_s = time.monotonic() + PACE * (time.monotonic() - begun)
 
     def _publish_correction(self, follower: Follower, by_tf: bool) -> None:
@@ -268,7 +268,7 @@ class MapperNode(NodeBase):
         if odom_frame not in self._shared_frames:
             self._shared_frames.add(odom_frame)
             self.get_logger().warning(
-                f"two robots tell their odometry in {odom_frame!r}: their corrections are not broadcast on /tf; "
+                f"two robots publish their odometry in {odom_frame!r}: their corrections are not broadcast on /tf; "
                 "give the frames of each robot a prefix of its own"
             )
         return False

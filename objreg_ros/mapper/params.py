@@ -24,7 +24,7 @@ VAGUER = 10.0  # times the deviations of odometry, where closures are trusted
 
 @dataclass(frozen=True)
 class MapperParams(Params):
-    """Everything that a user may set in this room."""
+    """The parameters of the mapper."""
 
     DROPPED = GONE
 
@@ -33,14 +33,14 @@ class MapperParams(Params):
         15.0, "rotation after which odometry becomes a keyframe", "deg", ge=0.1, le=180.0, live=True
     )
 
-    # How odometry is believed: errors grow with the square root of the way, so a steady bias fits in over a long way.
+    # How odometry is believed: errors grow with the square root of the path, so a steady bias fits in over a long path.
     odometry_translation_error: float = param(
         0.02, "error of position after one metre or one radian, one sigma", "m", ge=1e-4
     )
     odometry_rotation_error: float = param(
         1.0, "error of rotation after one metre or one radian, one sigma", "deg", ge=1e-3
     )
-    # And its steady error, which the closures tell; 0 is never any.
+    # And its steady error, which the closures reveal; 0 is never any.
     steady_heading: float = param(
         1.0, "error of heading that every metre adds alike, one sigma", "deg/m", ge=0.0, live=True
     )
@@ -61,7 +61,7 @@ class MapperParams(Params):
     )
     max_stretch: float = param(
         1.5,
-        "a constraint over more than so many times the way of odometry, and a metre, is implausible",
+        "a constraint over more than so many times the path of odometry, and a metre, is implausible",
         ge=1.0,
         live=True,
     )

@@ -21,9 +21,9 @@ from objreg_ros.mapper.strain import Strain, strain_of
 from objreg_ros.mapper.trajectory import Trajectory
 
 LEAST_SIGMAS = 1e-3, float(np.radians(0.025))  # m and rad: no constraint is believed to know better, whatever it claims
-SLACK_M = 1.0  # that a closure may lead farther than any way: odometry at rest trembles, and is not the camera
+SLACK_M = 1.0  # that a closure may lead farther than any path: odometry at rest trembles, and is not the camera
 Mounting = Callable[[str, str], Array | None]  # T_body_camera of a robot and a camera's frame; None: they are one
-VAGUEST = 1e12  # m^2 and rad^2: ROS says "unknown" by less; what is known no better tells nothing
+VAGUEST = 1e12  # m^2 and rad^2: ROS says "unknown" by less; what is known no better adds nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Summary:
 
 
 class ImplausibleError(ValueError):
-    """A closure claims what cannot be: a way that no body went, or a pose of which nothing is known."""
+    """A closure claims what cannot be: a path that no body took, or a pose of which nothing is known."""
 
 
 class UnknownRobotError(ValueError):
@@ -48,7 +48,7 @@ class UnknownRobotError(ValueError):
 
 
 class PoseGraph:
-    """Sessions of odometry and the closures between their moments; `optimise` makes them agree.
+    """Sessions of odometry and the closures between their keyframes; `optimise` makes them agree.
 
     The map's frame is that of the first session's odometry at its beginning, whose ever that is. Another session is in
     it once closures tie it there. What is asked of a robot is asked of its newest session, in which its odometry goes
@@ -81,14 +81,14 @@ class PoseGraph:
         return self._going_on(robot).add(odometry, self.params)
 
     def add_closure(self, closure: LoopClosure, T_body_camera: Array | Mounting | None = None) -> bool:
-        """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet).
+        """Tie the two keyframes nearest to the closure's stamps; False if odometry does not cover both (yet).
 
-        Moments nearest to one and the same keyframe tie nothing, which is True too. ``T_body_camera`` is where the
-        camera of the closure sits on the body of the odometry; the same place if None. What is called tells it of the
+        Stamps nearest to one and the same keyframe tie nothing, which is True too. ``T_body_camera`` is where the
+        camera of the closure sits on the body of the odometry; the same place if None. A callable gives it for the
         robot of a session and the name of a camera.
 
-        In a gap of the odometry it never will (`in_gap`): where the camera was by then nobody knows. ValueError for a
-        closure whose moments are of two runs of one clock that it does not name. `ImplausibleError` for one that leads
+        In a gap of the odometry it never will (`in_gap`): the camera's pose is unknown there. ValueError for a
+        closure whose stamps are of two runs of one clock that it does not name. `ImplausibleError` for one that leads
         farther than odometry went, or knows nothing. `UnknownRobotError` for one of two robots whose odometry is one.
         No closure is believed to know better than `LEAST_SIGMAS`.
         """
@@ -145,10 +145,10 @@ class PoseGraph:
             _mounted(T_body_camera, one.robot, closure.from_frame_id),
             _mounted(T_body_camera, other.robot, closure.to_frame_id),
         )
-        moments = one.keyframes.stamps_ns[ends[0].keyframe], other.keyframes.stamps_ns[ends[1].keyframe]
-        ways = one.odometry, other.odometry
+        stamps_ns = one.keyframes.stamps_ns[ends[0].keyframe], other.keyframes.stamps_ns[ends[1].keyframe]
+        odometry = one.odometry, other.odometry
         with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
-            constraint = between_keyframes(closure, ways, moments, mounts, self.params.odometry_sigmas)
+            constraint = between_keyframes(closure, odometry, stamps_ns, mounts, self.params.odometry_sigmas)
         self._refuse_implausible(ends, constraint)
         covariance = floored(constraint.covariance, LEAST_SIGMAS)
         self._closures.append(Tie(*ends, constraint._replace(covariance=covariance), closure))
@@ -157,10 +157,10 @@ class PoseGraph:
         known = np.abs(constraint.covariance).max()
         if not known <= VAGUEST:
             raise ImplausibleError(f"expected variances of at most {VAGUEST:g} m^2 and rad^2, got {known:g}")
-        (most, way), metres = self._farthest(ends), np.linalg.norm(constraint.T_from_to[:3, 3])
+        (most, path), metres = self._farthest(ends), np.linalg.norm(constraint.T_from_to[:3, 3])
         if not metres <= most:
             raise ImplausibleError(
-                f"expected a constraint over at most {most:.2f} m, as odometry went {way:.2f} m meanwhile, "
+                f"expected a constraint over at most {most:.2f} m, as odometry went {path:.2f} m meanwhile, "
                 f"got {metres:.4g} m"
             )
 
@@ -170,15 +170,15 @@ class PoseGraph:
         if s1 != s2:
             return VAGUEST, np.inf
         session = self.sessions[s1]
-        way = session.way_m(k1, k2)
-        return SLACK_M + self.params.max_stretch * way + self.params.max_speed * session.silent_s(k1, k2), way
+        path = session.way_m(k1, k2)
+        return SLACK_M + self.params.max_stretch * path + self.params.max_speed * session.silent_s(k1, k2), path
 
     def in_gap(self, closure: LoopClosure) -> bool:
-        """Whether a moment of the closure lies in a gap of the newest odometry."""
+        """Whether a stamp of the closure lies in a gap of the newest odometry."""
         return any(map(self.sessions.in_gap, moments_of(closure)))
 
     def is_before_odometry(self, closure: LoopClosure) -> bool:
-        """Whether odometry began after a moment of the closure that no other session has: it will never be covered."""
+        """Whether odometry began after a stamp of the closure that no other session has: it will never be covered."""
         return any(map(self.sessions.is_before_odometry, moments_of(closure)))
 
     # Solving
@@ -246,11 +246,11 @@ class PoseGraph:
 
     @property
     def keyframes(self) -> Trajectory:
-        """Those of the one robot's newest session, as odometry told them."""
+        """Those of the one robot's newest session, as odometry gave them."""
         return self.keyframes_of("")
 
     def keyframes_of(self, robot: str) -> Trajectory:
-        """Those of a robot's newest session, as odometry told them; none before it begins."""
+        """Those of a robot's newest session, as odometry gave them; none before it begins."""
         return self._going_on(robot).keyframes
 
     @property
@@ -296,7 +296,7 @@ class PoseGraph:
 
         The last are the residuals of the pruned ones, in standard deviations.
         """
-        mapped = [stacked([T for _, T in way]) for way in self.paths()]
+        mapped = [stacked([T for _, T in path]) for path in self.paths()]
         residuals, kept = self._solution.residuals, self._solution.kept
         known = [
             k
@@ -308,7 +308,7 @@ class PoseGraph:
         return places[kept[known]], places[~kept[known]], residuals[known][~kept[known]]
 
     def path(self, robot: str = "") -> list[tuple[int, Array]]:
-        """Stamp and ``T_map_body`` of every keyframe of a robot's newest session; as odometry tells it, if unplaced."""
+        """Stamp and ``T_map_body`` of every keyframe of a robot's newest session; as odometry gives it, if unplaced."""
         session = self.sessions.newest(robot)
         return [] if session is None else self._path_of(session)
 
@@ -335,7 +335,7 @@ class PoseGraph:
         return [T for path in paths for _, T in path], edges
 
     def corrected(self, stamps_ns: Iterable[int], robot: str = "", session: int | None = None) -> list[Array]:
-        """``T_map_body`` at any moments that a robot's newest odometry covers; ValueError for one that it does not.
+        """``T_map_body`` at any stamps that a robot's newest odometry covers; ValueError for one that it does not.
 
         With ``session``, a number, of that one.
         """
@@ -358,9 +358,9 @@ class PoseGraph:
         return np.concatenate([solved, T_map_odom @ odom[len(solved) :]])
 
 
-def _mounted(told: Array | Mounting | None, robot: str, frame_id: str) -> Array:
+def _mounted(mounting: Array | Mounting | None, robot: str, frame_id: str) -> Array:
     """``T_body_camera`` of a camera on a robot."""
-    T = told(robot, frame_id) if callable(told) else told
+    T = mounting(robot, frame_id) if callable(mounting) else mounting
     return np.eye(4) if T is None else T
 
 
@@ -368,7 +368,7 @@ def _corrected_at(stamp_ns: int, session: Session, mapped: Array) -> Array:
     """``T_map_body``: between keyframes it goes over smoothly from the correction of the one to the other's.
 
     What goes over is where they put the body. The corrections themselves turn about the origin of odometry, and
-    between two of them a body far from there would leave its way.
+    between two of them a body far from there would leave its path.
     """
     T_odom_body, keyframes = session.odometry.at(stamp_ns), session.keyframes
     bodies, near = Trajectory(), keyframes.nearest(stamp_ns)

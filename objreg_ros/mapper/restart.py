@@ -17,7 +17,7 @@ AHEAD_NS = 60_000_000_000  # a stamp that leaps so far ahead is believed once ot
 
 
 class Anew(Enum):
-    """Why a new map begins; the value is the reason that the books show."""
+    """Why a new map begins; the value is the reason that the counters show."""
 
     TIME = "time_jump"
     PLACE = "odometry_leap"

@@ -193,8 +193,8 @@ class RobustGraph:
     def _doubt(self, newest: int) -> None:
         """Leave out those that were the most doubtful when they came, one by one, where that is expected to cost less.
 
-        And each with those that say the same: lies that agree hold each other up. For it speak the newest, and those
-        that were left out and say the same as it, as far as they fit then.
+        And each with those that say the same: lies that agree hold each other up. In its favour count the newest, and
+        those that were left out and say the same as it, as far as they fit then.
         """
         kept, left_out = np.flatnonzero(self.kept), np.flatnonzero(~self.kept)
         voters = np.setdiff1d(left_out[self._saying_the_same(newest)[left_out]], self._withdrawn)[:MOST_ALIKE].tolist()
@@ -228,7 +228,7 @@ class RobustGraph:
         return state
 
     def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: Sequence[int] = ()) -> _State:
-        """Closures go in and out until none wants to. The best state on the way."""
+        """Closures go in and out until none wants to. The best state of all rounds."""
         best = state
         for _ in range(ROUNDS):
             out, into = state.kept & (state.residuals > self.limit), ~state.kept & (state.residuals <= self.limit)

@@ -29,18 +29,18 @@ BROKEN = (
 )  # what numpy, zipfile and json say of a file that is not whole
 
 
-def _labels(told: Any) -> tuple[str, ...]:
-    return tuple(str(label) for label in told)
+def _labels(value: Any) -> tuple[str, ...]:
+    return tuple(str(label) for label in value)
 
 
-def _stamp(told: Any) -> int:
-    if type(told) is not int or not limits.LEAST_STAMP_NS <= told <= limits.MOST_STAMP_NS:
-        raise ValueError(f"closure: expected a stamp that ROS has, got {told!r}")
-    return told
+def _stamp(value: Any) -> int:
+    if type(value) is not int or not limits.LEAST_STAMP_NS <= value <= limits.MOST_STAMP_NS:
+        raise ValueError(f"closure: expected a stamp that ROS has, got {value!r}")
+    return value
 
 
-def _session(told: Any) -> int | None:
-    return None if told is None else int(told)
+def _session(value: Any) -> int | None:
+    return None if value is None else int(value)
 
 
 KINDS: dict[str, Callable[[Any], Any]] = {
@@ -53,7 +53,7 @@ KINDS: dict[str, Callable[[Any], Any]] = {
     "to_session": _session,
     "from_robot": str,
     "to_robot": str,
-}  # of a closure, by what makes each of what a file tells
+}  # of a closure: the member and what makes it of the value in a file
 OF_CLOSURES = "ends", "T_1_2", "covariances", "T_from_to", "closure_covariances"  # a row for each
 
 
@@ -65,14 +65,14 @@ def beside(graph_path: Path) -> Path:
 def packed(graph: PoseGraph) -> dict[str, Any]:
     """All of a graph in arrays, for `save`, which takes longer."""
     ties = graph.closure_ties
-    told = {
+    header = {
         "version": VERSIONS[-1],
         "names": [sorted(session.names) for session in graph.sessions],
         "robots": [session.robot for session in graph.sessions],
         "closures": [{name: getattr(tie.closure, name) for name in KINDS} for tie in ties],
     }
     arrays: dict[str, Any] = {
-        "told": np.frombuffer(json.dumps(told).encode(), np.uint8),
+        "told": np.frombuffer(json.dumps(header).encode(), np.uint8),
         "ends": np.array([(*tie.end1, *tie.end2) for tie in ties], np.int64).reshape(-1, 4),
         "T_1_2": stacked([tie.constraint.T_from_to for tie in ties]),
         "covariances": np.array([tie.constraint.covariance for tie in ties]).reshape(-1, 6, 6),
@@ -104,39 +104,39 @@ def load(path: Path, params: MapperParams) -> PoseGraph:
         if unpacked > MOST_BYTES:
             raise ValueError(f"expected at most {MOST_BYTES} bytes unpacked, got {unpacked}")
         with np.load(path, allow_pickle=False) as arrays:
-            told = json.loads(arrays["told"].tobytes())
-            _require_members(told, arrays.files)
-            return _graph(told, {name: arrays[name] for name in arrays.files}, params)
+            header = json.loads(arrays["told"].tobytes())
+            _require_members(header, arrays.files)
+            return _graph(header, {name: arrays[name] for name in arrays.files}, params)
     except BROKEN as error:
         raise ValueError(f"{path}: expected a map that ~/save wrote, got a file that is none: {error}") from error
 
 
-def _require_members(told: Mapping[str, Any], names: Sequence[str]) -> None:
+def _require_members(header: Mapping[str, Any], names: Sequence[str]) -> None:
     """ValueError unless a file has what it says, and nothing else, before that is unpacked."""
-    if told["version"] not in VERSIONS:
-        raise ValueError(f"version: expected {' or '.join(map(str, VERSIONS))}, got {told['version']!r}")
-    if not told["names"]:
+    if header["version"] not in VERSIONS:
+        raise ValueError(f"version: expected {' or '.join(map(str, VERSIONS))}, got {header['version']!r}")
+    if not header["names"]:
         raise ValueError("expected at least one session, got none")
-    expected = {"told", *OF_CLOSURES, *(f"{k}_{key}" for k in range(len(told["names"])) for key in Session.ARRAYS)}
+    expected = {"told", *OF_CLOSURES, *(f"{k}_{key}" for k in range(len(header["names"])) for key in Session.ARRAYS)}
     if len(names) != len(expected) or expected.symmetric_difference(names):
         odd = sorted(expected.symmetric_difference(names)) or sorted(names)
-        raise ValueError(f"expected arrays of {len(told['names'])} sessions, got more or fewer: {', '.join(odd[:3])}")
+        raise ValueError(f"expected arrays of {len(header['names'])} sessions, got more or fewer: {', '.join(odd[:3])}")
 
 
-def _graph(told: Mapping[str, Any], arrays: Mapping[str, Array], params: MapperParams) -> PoseGraph:
+def _graph(header: Mapping[str, Any], arrays: Mapping[str, Array], params: MapperParams) -> PoseGraph:
     if odd := sorted(name for name, array in arrays.items() if array.dtype.kind not in "fiu"):
         raise ValueError(f"expected real numbers, got others in {', '.join(odd[:3])}")
     counts = {name: len(arrays[name]) for name in OF_CLOSURES}
-    if set(counts.values()) != {len(told["closures"])}:
-        raise ValueError(f"expected {len(told['closures'])} closures everywhere, got {counts}")
+    if set(counts.values()) != {len(header["closures"])}:
+        raise ValueError(f"expected {len(header['closures'])} closures everywhere, got {counts}")
     graph = PoseGraph(params)
     graph.sessions.clear()
-    robots = told.get("robots", [""] * len(told["names"]))
-    for number, (names, robot) in enumerate(zip(told["names"], robots, strict=True)):
+    robots = header.get("robots", [""] * len(header["names"]))
+    for number, (names, robot) in enumerate(zip(header["names"], robots, strict=True)):
         session = Session.of_arrays({key: arrays[f"{number}_{key}"] for key in Session.ARRAYS})
         session.names, session.robot = {int(name) for name in names}, str(robot)
         graph.sessions.append(session)
-    for number, known in enumerate(told["closures"]):
+    for number, known in enumerate(header["closures"]):
         known = {name: make(known[name]) for name, make in KINDS.items() if name in known}
         T, C = arrays["T_from_to"][number], arrays["closure_covariances"][number]
         s1, k1, s2, k2 = arrays["ends"][number].tolist()

@@ -15,15 +15,15 @@ from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.sparse import SparseTrajectory
 from objreg_ros.mapper.trajectory import Trajectory
 
-LOST_S = 600.0  # a silence after which the body may be anywhere, so that a longer one tells no less
+LOST_S = 600.0  # a silence after which the body may be anywhere, so that a longer one adds no doubt
 
 
 class Session:
     """Its ``odometry`` gives back what was added to within 1 mm and 0.05°, and the poses of ``keyframes`` exactly.
 
-    ``robot`` is whose odometry it is, empty for the only one there is. ``names`` are the sessions that closures tell of
-    its moments. ``is_over``: no odometry comes any more. Everything grows at the end alone, so a length tells what was
-    there at one moment.
+    ``robot`` is whose odometry it is, empty for the only one there is. ``names`` are the sessions that closures give
+    its keyframes. ``is_over``: no odometry comes any more. Everything grows at the end alone, so a length says what
+    was there at one time.
     """
 
     def __init__(self, robot: str = "") -> None:
@@ -47,7 +47,7 @@ class Session:
     ARRAYS = ("stamps_ns", "poses", "keyframes", "gaps", "variances", "way")
 
     def arrays(self) -> dict[str, Array]:
-        """All of it: poses with stamps, which of them are keyframes, silences, errors and ways of the steps."""
+        """All of it: poses with stamps, which of them are keyframes, silences, errors and lengths of the steps."""
         return {
             "stamps_ns": np.array(self.odometry.stamps_ns, np.int64),
             "poses": stacked(self.odometry.poses),
@@ -76,7 +76,7 @@ class Session:
         if not (np.isfinite(poses).all() and all(is_rigid(T) for T in poses) and spread.all()):
             raise ValueError("session: expected rigid poses and positive variances, got others")
         if not (np.isfinite(way).all() and (np.diff(way) >= 0.0).all()):
-            raise ValueError("session: expected a way that grows, got one that does not")
+            raise ValueError("session: expected a path length that grows, got one that does not")
         session.odometry = SparseTrajectory.of(stamps.tolist(), list(poses), [tuple(gap) for gap in gaps.tolist()])
         for stamp in keyframes.tolist():
             session.keyframes.append(stamp, session.odometry.at(stamp))
@@ -85,11 +85,11 @@ class Session:
         return session
 
     def covers(self, stamp_ns: int) -> bool:
-        """Whether its odometry tells where the body was at a moment."""
+        """Whether its odometry says where the body was at a stamp."""
         return self.odometry.covers(stamp_ns)
 
     def is_ahead(self, stamp_ns: int) -> bool:
-        """Whether its odometry, which goes on, has yet to come to a moment after it began."""
+        """Whether its odometry, which goes on, has yet to come to a stamp after it began."""
         known = self.odometry.stamps_ns
         return not known or (known[0] <= stamp_ns and known[-1] < stamp_ns)
 

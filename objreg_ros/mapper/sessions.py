@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sessions of a graph, of all its robots: in which of them odometry goes on, and which one a moment is of."""
+"""The sessions of a graph, of all its robots: in which of them odometry goes on, and which one a stamp is of."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from objreg_ros.mapper.session import Session
 
 
 class Moment(NamedTuple):
-    """An end of a closure: ``robot`` is empty and ``session`` None where they are not told."""
+    """An end of a closure: ``robot`` is empty and ``session`` None where they are not given."""
 
     robot: str
     session: int | None
@@ -27,9 +27,9 @@ def moments_of(closure: LoopClosure) -> tuple[Moment, Moment]:
 
 
 class Sessions(list[Session]):
-    """In the order in which they began. One of which no odometry came yet is the last, and gives way to the next.
+    """In the order in which they began. One of which no odometry came yet is the last, and the next replaces it.
 
-    Robots drive at the same time by clocks that may tell the same, so a moment is looked for among the sessions of its
+    Robots drive at once by clocks that may agree, so a moment is looked for among the sessions of its
     robot: among all where it names none, and in those of an odometry that has no name.
     """
 
@@ -41,7 +41,7 @@ class Sessions(list[Session]):
         self.learn(len(self) - 1, name)
 
     def learn(self, session: int, name: int | None) -> None:
-        """What closures call a session; None tells nothing."""
+        """What closures call a session; None names nothing."""
         if name is not None:
             self[session].names.add(name)
 
@@ -75,7 +75,7 @@ class Sessions(list[Session]):
         if covering:
             raise ValueError(
                 f"expected a constraint that names its sessions, as {max(len(covering), 2)} runs of odometry have the "
-                f"moment {moment.stamp_ns} ns, got none that tells; objreg_msgs/LoopClosure names them and the robots"
+                f"stamp {moment.stamp_ns} ns, got one without; objreg_msgs/LoopClosure names them and the robots"
             )
         return None
 
@@ -90,7 +90,7 @@ class Sessions(list[Session]):
 
     def _is_lost(self, moment: Moment) -> bool:
         on = [self[k].odometry for k in self._going_on(moment.robot)]
-        past = all(way.in_gap(moment.stamp_ns) or (way.stamps_ns and moment.stamp_ns < way.stamps_ns[0]) for way in on)
+        past = all(one.in_gap(moment.stamp_ns) or (one.stamps_ns and moment.stamp_ns < one.stamps_ns[0]) for one in on)
         return bool(on) and past and not self._covering(moment)
 
     def _may_come(self, moment: Moment) -> bool:

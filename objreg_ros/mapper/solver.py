@@ -3,7 +3,7 @@
 
 The graph has a node where a closure holds a keyframe, and in between what `Chain` says. What is steadily wrong with
 odometry is taken out where that explains as much more as three more numbers must (Schwarz, "Estimating the dimension of
-a model", 1978): a few closures that are all a little wrong one way are no evidence of it.
+a model", 1978): a few closures that err a little in one direction are no evidence of it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Tie(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """What there is to solve at one moment, as numbers of what is there by then, since all of it only grows."""
+    """What there is to solve at one time, as numbers of what is there by then, since all of it only grows."""
 
     solver: Solver
     sessions: Sequence[Session]
@@ -62,7 +62,7 @@ class Problem(NamedTuple):
     tie_count: int
     withdrawn: frozenset[int]  # numbers of ties
     params: MapperParams
-    inconsistent: frozenset[int] = frozenset()  # those that others speak against in pairs, for now
+    inconsistent: frozenset[int] = frozenset()  # those that others contradict in pairs, for now
 
     @property
     def left_out(self) -> frozenset[int]:
@@ -188,7 +188,7 @@ class Solver:
         self._held.update(nodes)
 
     def _node(self, problem: Problem, end: End) -> int:
-        """The node of a keyframe, which becomes one if it is none; so do some on the way there from the last."""
+        """The node of a keyframe, which becomes one if it is none; so do some on the path there from the last."""
         route = self._routes[end.session]
         self._extend(problem, end.session)
         while (between := route.chain.straight_until(route.keyframes[-1])) < end.keyframe:

@@ -24,11 +24,11 @@ class SparseTrajectory(Trajectory):
     """A `Trajectory` whose `at` is within 1 mm and 0.05° of every pose that was appended, of however few it keeps.
 
     The first, the newest and every pinned pose are kept as they are. A pose between the last one that stays and the
-    newest is left out while the straight way between the two passes it and all that were left out before near enough:
-    each of them bounds the velocity of that way, so what was left out need not be known any more (Bristol, "Swinging
+    newest is left out while the straight line between the two passes it and all that were left out before near enough:
+    each of them bounds the velocity of that line, so what was left out need not be known any more (Bristol, "Swinging
     Door Trending", 1990). Turns are compared as rotation vectors: these are never nearer than the rotations are.
 
-    Moments within a gap of the poses (`GAP_NS`) are not covered.
+    Times within a gap of the poses (`GAP_NS`) are not covered.
     """
 
     def __init__(self) -> None:
@@ -71,16 +71,16 @@ class SparseTrajectory(Trajectory):
             self._least, self._most = velocity - slack, velocity + slack
 
     def covers(self, stamp_ns: int) -> bool:
-        """Whether the moment lies between the first and the last pose, and in no gap."""
+        """Whether the time lies between the first and the last pose, and in no gap."""
         return super().covers(stamp_ns) and not self.in_gap(stamp_ns)
 
     def in_gap(self, stamp_ns: int) -> bool:
-        """Whether nothing came around the moment."""
+        """Whether nothing came around the time."""
         k = bisect_left(self._gaps, stamp_ns, key=lambda gap: gap[1])
         return k < len(self._gaps) and self._gaps[k][0] < stamp_ns < self._gaps[k][1]
 
     def silent_s(self, first_ns: int, last_ns: int) -> float:
-        """For how many seconds between two moments nothing came."""
+        """For how many seconds between two stamps nothing came."""
         return sum(max(0, min(end, last_ns) - max(start, first_ns)) for start, end in self._gaps) / SECOND_NS
 
     def pin(self) -> None:
@@ -88,13 +88,13 @@ class SparseTrajectory(Trajectory):
         self._least, self._most = _nothing()
 
     def _is_gap(self, waited_ns: int) -> bool:
-        """Whether nothing came for too long. A gap tells what is usual too, else poses that come seldomer never do."""
+        """Whether nothing came for too long. A gap adds to the usual time too, else rarer poses never do."""
         longest_ns = min(max(GAP_NS, MISSED * self._usual_ns), LONGEST_NS)
-        is_gap, told_ns = waited_ns > longest_ns, min(waited_ns, longest_ns)
+        is_gap, counted_ns = waited_ns > longest_ns, min(waited_ns, longest_ns)
         if np.isfinite(self._usual_ns):
-            self._usual_ns += NEWEST * (told_ns - self._usual_ns)
+            self._usual_ns += NEWEST * (counted_ns - self._usual_ns)
         elif not is_gap:
-            self._usual_ns = float(told_ns)
+            self._usual_ns = float(counted_ns)
         return is_gap
 
     def _velocity_from(self, before: int) -> tuple[Array, Array]:

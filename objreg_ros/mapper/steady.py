@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is steadily wrong with odometry, told by the map: a heading that turns with the way, a scale, a mounting.
+"""What is steadily wrong with odometry, found by the map: a heading that turns with the path, a scale, a mounting.
 
 Unequal wheels, a camera that is calibrated a little wrong: most of what odometry gets wrong it gets wrong all along
 (Borenstein and Feng, "Measurement and Correction of Systematic Odometry Errors in Mobile Robots", 1996). Closures that
@@ -18,7 +18,7 @@ from objreg_ros.geometry import inverses, rotation_from_vector
 from objreg_ros.mapper.constraint import rotation_vectors
 
 UP = np.array([0.0, 0.0, 1.0])  # of the frame of odometry (REP-103)
-LEAST_VARIANCE = 1e-12  # m^2 and rad^2 of a step: one at rest tells nothing, and does not divide by nothing
+LEAST_VARIANCE = 1e-12  # m^2 and rad^2 of a step: one at rest adds nothing, and does not divide by nothing
 QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
@@ -33,11 +33,11 @@ class Steady(NamedTuple):
 def corrected_steps(T_odom_body: Array, steady: Steady) -> Array:
     """``T_1_2 (n - 1, 4, 4)`` from each of n poses of odometry to the next, corrected."""
     first, second = T_odom_body[:-1], T_odom_body[1:]
-    ways = second[:, :3, 3] - first[:, :3, 3]
-    turns = steady.heading * np.linalg.norm(ways, axis=1)[:, None] * UP
-    stretched = (1.0 + steady.along) * ways + steady.across * ways @ QUARTER_TURN.T
+    steps_m = second[:, :3, 3] - first[:, :3, 3]
+    turns = steady.heading * np.linalg.norm(steps_m, axis=1)[:, None] * UP
+    stretched = (1.0 + steady.along) * steps_m + steady.across * steps_m @ QUARTER_TURN.T
     R_1_odom = first[:, :3, :3].transpose(0, 2, 1)
-    T = np.tile(np.eye(4), (len(ways), 1, 1))
+    T = np.tile(np.eye(4), (len(steps_m), 1, 1))
     T[:, :3, :3] = R_1_odom @ rotation_from_vector(turns) @ second[:, :3, :3]
     T[:, :3, 3] = np.einsum("mij,mjk,mk->mi", R_1_odom, rotation_from_vector(0.5 * turns), stretched)
     return T
@@ -64,9 +64,9 @@ def _differences(T_odom_body: Array, T_map_body: Array) -> tuple[Array, Array]:
     motion, mapped = (inverses(T[:-1]) @ T[1:] for T in (T_odom_body, T_map_body))
     shifts = np.einsum("mij,mj->mi", R_odom_1, mapped[:, :3, 3] - motion[:, :3, 3])
     turns = rotation_vectors(mapped[:, :3, :3] @ motion[:, :3, :3].transpose(0, 2, 1))
-    ways = T_odom_body[1:, :3, 3] - T_odom_body[:-1, :3, 3]
-    lengths, left = np.linalg.norm(ways, axis=1)[:, None], ways @ QUARTER_TURN.T
-    A = np.zeros((len(ways), 6, 3))
+    steps_m = T_odom_body[1:, :3, 3] - T_odom_body[:-1, :3, 3]
+    lengths, left = np.linalg.norm(steps_m, axis=1)[:, None], steps_m @ QUARTER_TURN.T
+    A = np.zeros((len(steps_m), 6, 3))
     A[:, :3, 0], A[:, 3:, 0] = 0.5 * lengths * left, lengths * UP
-    A[:, :3, 1], A[:, :3, 2] = ways, left
+    A[:, :3, 1], A[:, :3, 2] = steps_m, left
     return np.hstack([shifts, np.einsum("mij,mj->mi", R_odom_1, turns)]), A

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far closures are from what odometry says between their moments, by the deviations of both.
+"""How far closures are from what odometry says between their keyframes, by the deviations of both.
 
 Closures that agree with each other, and with no other one beside them, bend a map whatever they say: odometry alone
-can speak against them.
+can contradict them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Strain(NamedTuple):
 
     @property
     def farthest(self) -> str:
-        """How far the farthest is, in words."""
+        """How far the farthest is, as text."""
         return f"{self.metres:.3f} m, {self.degrees:.2f} deg, {self.sigmas:.1f} deviations"
 
     @property

@@ -31,11 +31,11 @@ class Trajectory:
         self.poses.append(T_world_body)
 
     def covers(self, stamp_ns: int) -> bool:
-        """Whether the moment lies between the first and the last pose."""
+        """Whether the time lies between the first and the last pose."""
         return bool(self.stamps_ns) and self.stamps_ns[0] <= stamp_ns <= self.stamps_ns[-1]
 
     def at(self, stamp_ns: int) -> Array:
-        """The pose at a covered moment, interpolated; ValueError for one that is not covered."""
+        """The pose at a covered time, interpolated; ValueError for one that is not covered."""
         if not self.covers(stamp_ns):
             span = f"{self.stamps_ns[0]} to {self.stamps_ns[-1]} ns" if self.stamps_ns else "nothing"
             raise ValueError(f"expected a stamp within {span}, got {stamp_ns} ns")

@@ -47,8 +47,8 @@ class Waiting:
             fates += [] if fate is None else [fate]
             self.closures += [closure] if fate is None else []
         while len(self.closures) > self.most:
-            words = "no odometry covers the moments of the constraint"
-            fates.append(Fate(self.closures.pop(0), "queue_full", words))
+            text = "no odometry covers the keyframes of the constraint"
+            fates.append(Fate(self.closures.pop(0), "queue_full", text))
         return fates
 
     def _fate(self, graph: PoseGraph, closure: LoopClosure) -> Fate | None:
@@ -69,9 +69,9 @@ class Waiting:
     def _why_never(self, graph: PoseGraph, closure: LoopClosure) -> Iterator[tuple[str, str]]:
         """The reasons why odometry of a closure can no longer come, each with its explanation."""
         if graph.in_gap(closure):
-            yield "odometry_gap", "no odometry came around a moment of the constraint"
+            yield "odometry_gap", "no odometry came around a keyframe of the constraint"
         if graph.is_before_odometry(closure):
-            yield "before_odometry", "odometry begins after the first moment of the constraint"
+            yield "before_odometry", "odometry begins after the first keyframe of the constraint"
         if all(one.is_of_old_run(closure.to_ns) for one in self._followers.meant(closure.to_robot)):
             yield "time_jump", "it was found before time jumped back, and came after that"
 
@@ -89,9 +89,9 @@ class Waiting:
         If the body frame of the odometry lacks the robot's prefix, the frames on /tf lack it too, and the camera is
         looked up without the prefix.
         """
-        words = [one.newest for one in self._followers.meant(robot) if one.newest is not None]
-        is_bare = robot and not any(word.child_frame_id.startswith(f"{robot}/") for word in words)
-        return self._find_mount(words, frame_id.removeprefix(f"{robot}/") if is_bare else frame_id)
+        newest = [one.newest for one in self._followers.meant(robot) if one.newest is not None]
+        is_bare = robot and not any(one.child_frame_id.startswith(f"{robot}/") for one in newest)
+        return self._find_mount(newest, frame_id.removeprefix(f"{robot}/") if is_bare else frame_id)
 
 
 def _named(closure: LoopClosure) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One registrar for a store: two would give the same ids to different things.
+"""One registrar for a store: two would give the same ids to different objects.
 
 Our own few lines, as rosdep has no key for the library that has them, `filelock`.
 """
@@ -146,12 +146,12 @@ def _inode(status: os.stat_result) -> tuple[int, int]:
 
 
 def _holder(inode: tuple[int, int]) -> str:
-    """The number of the process that has a file, as far as the kernel tells."""
+    """The number of the process that has a file, as far as the kernel reports it."""
     with suppress(OSError, ValueError, IndexError):
         for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
-            words = line.split()
-            if "FLOCK" in words and words[-3].endswith(f":{inode[1]}"):
-                return words[-4]
+            parts = line.split()
+            if "FLOCK" in parts and parts[-3].endswith(f":{inode[1]}"):
+                return parts[-4]
     return "?"
 
 

@@ -210,7 +210,7 @@ def _context_columns(keyframe: Keyframe) -> list[bytes]:
 
 
 def _object_columns(objects: Sequence[KeyObject]) -> list[bytes]:
-    """All objects in one, so that like comes to like."""
+    """All objects in one, so that similar values are neighbours."""
     if not objects:
         return []
     clouds = [item.cloud for item in objects]

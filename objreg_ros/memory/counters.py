@@ -42,7 +42,7 @@ class Counters:
         return given + 1
 
     def give_landmark(self, given: int) -> None:
-        """Book that a landmark has an id; ValueError for one that no message could hold."""
+        """Count the id of a landmark; ValueError for one that no message could hold."""
         if given > MOST_IDS["landmark"]:
             raise ValueError(f"expected ids of landmarks up to {MOST_IDS['landmark']}, got {given}: they are used up")
         self.landmark = max(self.landmark, given)
@@ -52,12 +52,12 @@ class Counters:
         return Counters(keyframe=self.keyframe, object=self.object, closure=self.closure, landmark=self.landmark)
 
     def enter(self, table: str, row: Mapping[str, Any]) -> None:
-        """Book a row that is written."""
+        """Count a row that is written."""
         setattr(self, table, max(getattr(self, table), row["id"]))
         self.change(table, 1, row["seal"])
 
     def change(self, table: str, rows: int, seals: int) -> None:
-        """Book so many rows more, and so much that their seals sum up to."""
+        """Count so many rows more, and the sum of their seals."""
         setattr(self, f"{table}_rows", getattr(self, f"{table}_rows") + rows)
         setattr(self, f"{table}_seals", getattr(self, f"{table}_seals") + seals)
 

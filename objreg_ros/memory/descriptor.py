@@ -18,7 +18,7 @@ SIZE_WEIGHT, SHAPE_WEIGHT, COLOUR_WEIGHT = 0.5, 1.0, 0.7
 SIZE = 3 + (len(DISTANCE_EDGES) - 1) + HUES + 4  # extents, D2, hues, greys
 
 EMPHASIS = np.repeat(np.array([0.7, 1.0, 1.4], np.float32), [3, len(DISTANCE_EDGES) - 1, HUES + 4])
-"""What the parts of a stored descriptor weigh in retrieval: of many rooms' things colour tells more apart than size."""
+"""Weights of the parts of a stored descriptor in retrieval: in many rooms colour separates objects better than size."""
 
 
 def describe(cloud: ObjectCloud) -> Array:

@@ -60,7 +60,7 @@ class Viewpoints(MutableMapping[int, Array]):
 
 @dataclass(slots=True, eq=False)
 class Last:
-    """The latest sighting, without what only retrieval needs. ``numbers (14,)`` are what the properties tell."""
+    """The latest sighting, without what only retrieval needs. ``numbers (14,)`` are what the properties return."""
 
     session: int
     stamp_ns: int

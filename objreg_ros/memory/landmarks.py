@@ -2,7 +2,7 @@
 """Objects of the place with ids that stay: the same cup has the same id in every keyframe and session.
 
 Two sightings are the same landmark where they are at the same place in the same session, or where a closure put them
-upon each other. When a closure shows that two landmarks are one, the older id stays, and its axes. A closure's word
+upon each other. When a closure shows that two landmarks are one, the older id stays, and its axes. A closure
 counts for more than a place, which drifts with the session; and two that one keyframe shows together are never one.
 """
 
@@ -48,7 +48,7 @@ class Landmark:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Link:
-    """A closure's word that object ``index`` of the new keyframe is the stored sighting ``of``.
+    """A closure's statement that object ``index`` of the new keyframe is the stored sighting ``of``.
 
     ``R_there_here (3, 3)`` turns the axes of the new keyframe's session into those of the stored one's.
     """
@@ -201,7 +201,7 @@ class Landmarks:
     def _near(self, sighting: Sighting) -> set[int]:
         """The landmarks of the sighting's session and label group that may be within reach of it.
 
-        A thing may be so large that fewer cells are known than it reaches.
+        An object may be so large that fewer cells are known than it reaches.
         """
         reach = 2.0 * RADIUS_M + MIDDLE_WANDERS * sighting.extent  # the largest that it can be
         low, high = (np.floor((sighting.position + side * reach) / CELL).astype(int) for side in (-1, 1))

@@ -33,7 +33,7 @@ ADDED: dict[str, dict[str, Any]] = {  # what this version says besides, and what
     "closure": {"from_robot": "", "to_robot": "", "from_session": None, "to_session": None},
 }
 KINDS = {"INTEGER": int, "REAL": float, "TEXT": str, "BLOB": bytes}
-MOST = 2**53  # of a number in a row but stamps: those that are counted on from must have room
+MOST = 2**53  # of a number in a row but stamps: those that are counted on from must not overflow
 COUNTED = ("id", "session", "keyframe", "landmark")
 
 
@@ -142,7 +142,7 @@ def opened(path: Path, claim: Claim | None) -> sqlite3.Connection:
         return connection
     if claim is None:
         connection = connect(read_only_uri(path))
-        connection.execute("BEGIN")  # all that is read is of one moment
+        connection.execute("BEGIN")  # all that is read is of one time
         return connection
     if old:
         claim.replace(lambda beside: renewed(path, beside))

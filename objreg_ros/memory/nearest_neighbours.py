@@ -2,8 +2,8 @@
 """The stored objects of one label group, and the scan that finds the nearest of them.
 
 A scan is exact. Descriptors lie by dimension in tiles of `LANES` objects, so that the processor compares many at once.
-They are compared twice: rounded to bytes, a quarter of what a scan would have to read, and as they are. The bytes tell
-the most that an object of a tile can be alike. The descriptors themselves, and the other columns of an object, are
+They are compared twice: rounded to bytes, a quarter of what a scan would have to read, and as they are. The bytes bound
+how similar an object of a tile can be. The descriptors themselves, and the other columns of an object, are
 looked at only in tiles that may hold one of the nearest.
 """
 
@@ -25,7 +25,7 @@ from objreg_ros.registration.params import RegistrarParams
 LANES = 64
 NOWHERE = np.float32(np.inf)  # half the squared length of a row that is free
 STEP = np.repeat(np.array([1 / 32, 1 / 64], np.float32), [3, SIZE - 3])  # of the bytes: sizes lie in ±4, shares in ±2
-ROUNDING = 1e-5  # relative: what single precision may lose in a comparison, with room to spare
+ROUNDING = 1e-5  # relative: what single precision may lose in a comparison, with a margin
 NO_SESSION = -1  # of what our own tracking says where it is: nothing is left out for it
 
 
@@ -48,7 +48,7 @@ class Block:
     """The rows of one label group, which double when they are full; rows that are given up are used again.
 
     ``where (n, 4)`` float64 are x, y, z and travelled, ``when (n, 4)`` int64 stamp_ns, session, keyframe_id and whether
-    odometry told the pose.
+    odometry gave the pose.
     """
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ class Block:
         tiles = -(-self._used // LANES)
         descriptor = EMPHASIS * np.asarray(sighting.descriptor, np.float32)
         session = sighting.session if sighting.by_odometry else NO_SESSION
-        found, similarity = _likest(  # type: ignore[call-arg]
+        found, similarity = _closest(  # type: ignore[call-arg]
             self._descriptors[:tiles], self._bytes[:tiles], self._half_norms[:tiles], self._spans, self.where,
             self.when, descriptor, np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
             round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, sessions.own, sessions.hidden,
@@ -116,7 +116,7 @@ class Block:
 
 
 @numba.njit(cache=True, nogil=True)
-def _likest(  # type: ignore[no-untyped-def]
+def _closest(  # type: ignore[no-untyped-def]
     descriptors, steps, half_norms, spans, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius,
     drift, own, hidden, most, margin,
 ):  # fmt: skip
@@ -129,13 +129,13 @@ def _likest(  # type: ignore[no-untyped-def]
     seen = (descriptors, half_norms, tops, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius,
             drift, own, hidden, margin)  # fmt: skip
     best = [(-NOWHERE, 0, 0) for _ in range(most)]  # as a heap: the least is the first
-    likest = _look(best, -NOWHERE, floor, NOWHERE, *seen)
-    _look(best, likest, -NOWHERE, floor, *seen)
+    closest = _look(best, -NOWHERE, floor, NOWHERE, *seen)
+    _look(best, closest, -NOWHERE, floor, *seen)
     best.sort(reverse=True)
     near = 0
     while near < most and best[near][0] > max(best[0][0] - margin, -NOWHERE):
         near += 1
-    return np.array([row for _, _, row in best[:near]], np.int64), np.array([like for like, _, _ in best[:near]])
+    return np.array([row for _, _, row in best[:near]], np.int64), np.array([score for score, _, _ in best[:near]])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -152,24 +152,24 @@ def _promised(steps, half_norms, spans, descriptor):  # type: ignore[no-untyped-
 
 @numba.njit(cache=True, nogil=True)
 def _look(  # type: ignore[no-untyped-def]
-    best, likest, low, high, descriptors, half_norms, tops, where, when, descriptor, position, way, stamp_ns, session,
+    best, closest, low, high, descriptors, half_norms, tops, where, when, descriptor, position, way, stamp_ns, session,
     gap_ns, radius, drift, own, hidden, margin,
 ):  # fmt: skip
     """Put the most similar of the tiles that promise from ``low`` to below ``high`` on the heap ``best``.
 
-    An item is similarity, how old, row; none is -inf. The similarity of the likest so far goes in and comes back.
+    An item is similarity, how old, row; none is -inf. The highest similarity so far goes in and comes back.
     """
-    likeness = np.empty(LANES, np.float32)
+    similarity = np.empty(LANES, np.float32)
     for tile in range(len(tops)):
-        least = max(best[0][0], likest - margin, low)
+        least = max(best[0][0], closest - margin, low)
         if tops[tile] < least or tops[tile] >= high or tops[tile] == -NOWHERE:
             continue
-        least = max(best[0][0], likest - margin)
-        if _compare(descriptors[tile], half_norms[tile], descriptor, likeness) < least:
+        least = max(best[0][0], closest - margin)
+        if _compare(descriptors[tile], half_norms[tile], descriptor, similarity) < least:
             continue
         for lane in range(LANES):
-            row, like = tile * LANES + lane, likeness[lane]
-            if like < least or like == -NOWHERE or _holds(hidden, when[row, 1]):
+            row, score = tile * LANES + lane, similarity[lane]
+            if score < least or score == -NOWHERE or _holds(hidden, when[row, 1]):
                 continue
             if abs(when[row, 0] - stamp_ns) < gap_ns and _holds(own, when[row, 1]):
                 continue
@@ -178,9 +178,9 @@ def _look(  # type: ignore[no-untyped-def]
                 x, y, z = where[row, 0] - position[0], where[row, 1] - position[1], where[row, 2] - position[2]
                 if x * x + y * y + z * z > reach * reach:
                     continue
-            heapq.heappushpop(best, (like, -when[row, 2], row))
-            likest = max(likest, like)
-    return likest
+            heapq.heappushpop(best, (score, -when[row, 2], row))
+            closest = max(closest, score)
+    return closest
 
 
 @numba.njit(cache=True, nogil=True)

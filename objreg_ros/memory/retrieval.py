@@ -34,7 +34,7 @@ SPARE = 8  # keyframes that a query names for each one that is tried
 RANKED = 64  # keyframes with the most votes, which take turns
 GAP_SIGMA_M = 0.08  # deviation of the distance of two objects' middles from one view to another
 SAME_PLACE = 8.0  # so much likelier is what the session that goes on saw, or one that is known to show its place
-NEXT_OF_PASS = 0.7  # what the votes of a place are worth after each one of its pass that is tried before
+NEXT_OF_PASS = 0.7  # factor on the votes of a place after each one of its pass that is tried before
 THIS_PASS = 0.9  # and of the very pass that goes on: its motion is known
 NEIGHBOUR = 0.4  # and of a neighbour in time of one that is tried before
 EMPTY = Block()
@@ -136,15 +136,15 @@ class Index:
             np.abs(stamp_ns[:, None] - stamp_ns) < round(1e9 * self.params.thin_seconds)
         )
         same = self._same_pass(session[:, None], travelled[:, None], session, travelled)
-        worth = np.where(near, NEIGHBOUR, 1.0) * np.where(same, NEXT_OF_PASS, 1.0)
-        return np.asarray(_in_turn(votes, worth))
+        factors = np.where(near, NEIGHBOUR, 1.0) * np.where(same, NEXT_OF_PASS, 1.0)
+        return np.asarray(_in_turn(votes, factors))
 
     def _same_pass(
         self, session: Array, travelled: Array, other_session: Array | int, other_travelled: Array | float
     ) -> Array:
         """Whether odometry is certain of the motion between the two."""
-        params, way = self.params, np.abs(travelled - other_travelled)
-        sigma = params.odometry_translation_noise + params.odometry_drift * way
+        params, path = self.params, np.abs(travelled - other_travelled)
+        sigma = params.odometry_translation_noise + params.odometry_drift * path
         return np.asarray((session == other_session) & (sigma <= TIGHT_TRANSLATION_M))
 
 
@@ -201,13 +201,13 @@ def _arranged(ballots, votes, xyz, asked_gaps):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _in_turn(votes, worth):  # type: ignore[no-untyped-def]
+def _in_turn(votes, factors):  # type: ignore[no-untyped-def]
     """The order of places: always the one with the most votes; each lowers those of the others by its row."""
     left, order = votes.copy(), np.empty(len(votes), np.int64)
     for turn in range(len(votes)):
         best = np.argmax(left)
         order[turn] = best
-        left *= worth[best]
+        left *= factors[best]
         left[best] = -1.0
         for k in order[:turn]:
             left[k] = -1.0

@@ -18,7 +18,7 @@ class Sighting:
     """Object ``instance`` of a keyframe, in the frame of its session.
 
     ``extent`` m of the object, ``position (3,)`` of its middle and ``camera (3,)`` of the camera, m; ``travelled`` m
-    of the camera's path in the session until then; ``by_odometry`` whether odometry told the pose, or our own tracking,
+    of the camera's path in the session until then; ``by_odometry`` whether odometry gave the pose, or our own tracking,
     which may have slipped unnoticed; ``robot`` whose session it is; ``landmark`` the id that the object has wherever it
     is seen, 0 before it has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the session that
     saw the landmark first.

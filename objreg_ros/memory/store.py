@@ -2,10 +2,10 @@
 """What the registrar remembers, in one SQLite file: keyframes, their objects and closures.
 
 What `Store.add` has returned from is on the disk: the file is in WAL mode with full synchronisation, and a keyframe
-with its objects and closures is one transaction, so a process that is killed at any moment leaves whole keyframes. The
+with its objects and closures is one transaction, so a process that is killed at any time leaves whole keyframes. The
 log is folded into the file after each of them, so that nothing hangs on the log alone. What is read was written: every
 row has a checksum of all that it says (`seal`), and the `counters` say how many there are. Memory is bounded: only the
-last keyframes that were used stay decoded. So is the file: room that is left free goes back to the disk.
+last keyframes that were used stay decoded. So is the file: free space goes back to the disk.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Store:
             self._connection = connect(":memory:")
             bear(self._connection)
             return
-        with self._told("open", LEFT), ExitStack() as undo:
+        with self._reporting("open", LEFT), ExitStack() as undo:
             require_place(Path(self.path), read_only)
             if not read_only:
                 self._claim = Claim(Path(self.path), create)
@@ -97,7 +97,7 @@ class Store:
         ``merged`` says which landmarks became which, and in whose axes: known objects that turned out to be the same.
         StoreError where it cannot be written: then nothing of it is.
         """
-        with self._told(f"write keyframe {keyframe.keyframe_id}"), self._changing() as (transaction, counters):
+        with self._reporting(f"write keyframe {keyframe.keyframe_id}"), self._changing() as (transaction, counters):
             row = keyframe_row(keyframe)
             write(transaction, counters, "keyframe", row)
             for item, sighting in zip(keyframe.objects, sightings, strict=True):
@@ -110,7 +110,7 @@ class Store:
 
     def add_closure(self, closure: LoopClosure, merged: Mapping[int, Merge]) -> None:
         """Write a closure of keyframes that are stored already; ``merged`` and StoreError as in `add`."""
-        with self._told("write a closure"), self._changing() as (transaction, counters):
+        with self._reporting("write a closure"), self._changing() as (transaction, counters):
             write_closures(transaction, counters, (closure,), MOST_CLOSURES)
             rename_landmarks(transaction, counters, merged)
 
@@ -118,7 +118,7 @@ class Store:
         """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""
         if (recent := self._recent.get(keyframe_id)) is not None:
             return recent
-        with self._told(f"read keyframe {keyframe_id}"):
+        with self._reporting(f"read keyframe {keyframe_id}"):
             row = self._connection.execute("SELECT * FROM keyframe WHERE id = ?", (keyframe_id,)).fetchone()
             if row is None:
                 raise KeyError(keyframe_id)
@@ -130,7 +130,7 @@ class Store:
     def sightings(self, keyframe_id: int | None = None) -> Iterator[Sighting]:
         """Every stored object without its points, or those of one keyframe, oldest first."""
         only = "" if keyframe_id is None else f" WHERE keyframe = {int(keyframe_id)}"
-        with self._told("read the objects", LEFT):
+        with self._reporting("read the objects", LEFT):
             for row in self._connection.execute(f"{OBJECTS}{only} ORDER BY id"):
                 if row["keyframe"] not in self._heads:
                     raise ValueError(f"object {row['id']}: expected a stored keyframe, got number {row['keyframe']}")
@@ -138,7 +138,7 @@ class Store:
 
     def closures(self) -> Iterator[LoopClosure]:
         """Every stored closure, oldest first, without the registrations of its objects."""
-        with self._told("read the closures"):
+        with self._reporting("read the closures"):
             yield from map(closure_from_row, self._connection.execute("SELECT * FROM closure ORDER BY id"))
 
     def keyframe_ids(self) -> list[int]:
@@ -150,7 +150,7 @@ class Store:
 
         The newest is never one of them.
         """
-        with self._told("look at its size"):
+        with self._reporting("look at its size"):
             spare = bytes_in_use(self._connection) - most_bytes
             ids = list(self._heads)
             count = max(len(ids) - most, 0)
@@ -164,9 +164,9 @@ class Store:
         """Forget keyframes and their objects; their closures stay, up to `MOST_CLOSURES`.
 
         ``forgotten`` is how many of them go for no other reason than that there is a limit: they are counted. Of the
-        room that is free then, the file gives back what is more than `SPARE`, `STEP` pages at a time.
+        space that is free then, the file gives back what is more than `SPARE`, `STEP` pages at a time.
         """
-        with self._told("remove keyframes"), self._changing() as (transaction, counters):
+        with self._reporting("remove keyframes"), self._changing() as (transaction, counters):
             for keyframe_id in keyframe_ids:
                 delete(transaction, counters, "object", "WHERE keyframe = ?", (keyframe_id,))
                 delete(transaction, counters, "keyframe", "WHERE id = ?", (keyframe_id,))
@@ -174,7 +174,7 @@ class Store:
         for keyframe_id in keyframe_ids:
             self._recent.drop(keyframe_id)
             self._heads.pop(keyframe_id, None)
-        with self._told("give room back"):
+        with self._reporting("give space back"):
             shrink(self._connection, STEP)
 
     def clear(self) -> str:
@@ -185,7 +185,7 @@ class Store:
         """
         if self._claim is not None and (self._heads or self._counters.closure_rows):
             return self._set_aside(self._claim)
-        with self._told("forget everything"), self._changing() as (transaction, counters):
+        with self._reporting("forget everything"), self._changing() as (transaction, counters):
             for table in ("closure", "object", "keyframe"):
                 delete(transaction, counters, table)
             counters.forgotten = 0
@@ -195,7 +195,7 @@ class Store:
     def _set_aside(self, claim: Claim) -> str:
         path, given = Path(self.path), self._counters.emptied()
         self.save()  # all is in the one file
-        with self._told("set it aside"):
+        with self._reporting("set it aside"):
             self._connection.close()
             try:
                 dated = dated_link(path)
@@ -224,19 +224,19 @@ class Store:
 
     def next_keyframe(self) -> int:
         """An id that no keyframe ever had here; StoreError where they are used up."""
-        with self._told("number a keyframe"):
+        with self._reporting("number a keyframe"):
             return self._counters.next("keyframe")
 
     def next_landmark(self) -> int:
         """An id that no landmark ever had here, whatever was forgotten since; StoreError where they are used up."""
-        with self._told("number a landmark"):
+        with self._reporting("number a landmark"):
             return self._counters.next("landmark")
 
     def next_session(self) -> int:
         """The number of a session that nothing is stored of yet, nor is a closure to it, as to a keyframe elsewhere."""
-        with self._told("number a session"):
-            (told,) = self._connection.execute(SESSION).fetchone()
-        return max([told, *(head["session"] for head in self._heads.values())]) + 1
+        with self._reporting("number a session"):
+            (stored,) = self._connection.execute(SESSION).fetchone()
+        return max([stored, *(head["session"] for head in self._heads.values())]) + 1
 
     def sessions_beyond(self, robot: str, session: int, stamp_ns: int) -> frozenset[int]:
         """A robot's sessions before ``session``, up to the last that has a keyframe of ``stamp_ns`` or later."""
@@ -251,7 +251,7 @@ class Store:
 
     def counts(self) -> dict[str, int]:
         """How much is stored; ``forgotten`` are keyframes that went as there were too many."""
-        with self._told("count"):
+        with self._reporting("count"):
             landmarks = self._connection.execute("SELECT COUNT(DISTINCT landmark) FROM object").fetchone()[0]
         return {
             "keyframes": self._counters.keyframe_rows,
@@ -267,7 +267,7 @@ class Store:
 
         StoreError where that cannot be: a store in memory has no file, and a log that others read stays.
         """
-        with self._told(f"copy it to {path}" if path else "save it"):
+        with self._reporting(f"copy it to {path}" if path else "save it"):
             if path:
                 copy(self._connection, Path(path).expanduser())
                 return str(path)
@@ -286,7 +286,7 @@ class Store:
                 self._claim.release()
 
     @contextmanager
-    def _told(self, what: str, advice: str = "") -> Iterator[None]:
+    def _reporting(self, what: str, advice: str = "") -> Iterator[None]:
         """Say of any error of the database or of what it holds which file it is and what could not be done."""
         try:
             yield

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The file of a store: how it is made, and how it is told from others."""
+"""The file of a store: how it is made, and how it is recognised."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def bear(connection: sqlite3.Connection, counters: Counters | None = None) -> No
 
 
 def shrink(connection: sqlite3.Connection, most: int = 0) -> None:
-    """Give room that lies free in the file back to the disk: all beyond `SPARE`, or ``most`` pages of it."""
+    """Give free space in the file back to the disk: all beyond `SPARE`, or ``most`` pages of it."""
     spare = connection.execute("PRAGMA freelist_count").fetchone()[0] - SPARE
     if spare > 0:
         pages = min(spare, most) if most else spare

@@ -22,7 +22,7 @@ OBJECTS = f"SELECT {', '.join(LIGHT)}, seal FROM object"
 
 
 def write(transaction: sqlite3.Connection, counters: Counters, table: str, row: Mapping[str, Any]) -> None:
-    """Enter a row and book it."""
+    """Enter a row and count it."""
     insert(transaction, table, row)
     counters.enter(table, row)
 
@@ -30,7 +30,7 @@ def write(transaction: sqlite3.Connection, counters: Counters, table: str, row: 
 def delete(
     transaction: sqlite3.Connection, counters: Counters, table: str, where: str = "", values: Sequence[Any] = ()
 ) -> None:
-    """Delete the rows of a table that ``where`` names, all without it, and book that."""
+    """Delete the rows of a table that ``where`` names, all without it, and count that."""
     rows, seals = count(transaction, table, where, values)
     transaction.execute(f"DELETE FROM {table} {where}", values)
     counters.change(table, -rows, -seals)

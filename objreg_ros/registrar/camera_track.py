@@ -31,7 +31,7 @@ class CameraTrack:
     """Its frames become keyframes, by ``numbers`` of sessions that all share; what is likely waits for what comes next.
 
     ``thinning`` knows what was accepted in the run of the clock that goes on, ``hidden`` are the sessions whose stamps
-    would name moments of that run.
+    would name keyframes of that run.
     """
 
     def __init__(self, params: RegistrarParams, numbers: SessionNumbers) -> None:
@@ -97,11 +97,11 @@ class CameraTrack:
         confirmed, refused = self.confirmation.settle(now_ns)
         closures = list(self._released(recollection).closures) if self.proven else []
         for waiting in confirmed:
-            moments = waiting.from_session, waiting.closure.from_ns, waiting.closure.to_ns
-            if self.thinning.redundant(*moments):
+            pair = waiting.from_session, waiting.closure.from_ns, waiting.closure.to_ns
+            if self.thinning.redundant(*pair):
                 refused.append(waiting.refused(redundant(recollection.params.thin_seconds)))
                 continue
-            self.thinning.accept(*moments)
+            self.thinning.accept(*pair)
             if self.proven:
                 closures.append(self._late(waiting, recollection))
             else:
@@ -158,7 +158,7 @@ class CameraTracks(dict[Camera, CameraTrack]):
         """Follow a camera to a keyframe; what is given up where its clock began anew.
 
         Then what an earlier run of the clock saw is left out, unless that was over by then: a stamp of it would name a
-        moment of this run, and the session does not travel with a constraint.
+        keyframe of this run, and the session does not travel with a constraint.
         """
         track = self.of(keyframe.camera)
         given_up: tuple[Rejected, ...] = ()
@@ -209,7 +209,7 @@ def refused_window(window: FrameWindow, refusal: Refusal) -> Rejected:
 
 
 def clock_refusals(clock: Clock, hidden: frozenset[int], keyframe: Keyframe) -> tuple[Rejected, ...]:
-    """What is told where a run of the clock begins that leaves sessions out; nothing where it leaves none."""
+    """What is reported where a run of the clock begins that leaves sessions out; nothing where it leaves none."""
     if not hidden:
         return ()
     why = f"sessions up to {max(hidden)} had seen that time before"

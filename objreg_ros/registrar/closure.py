@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a registered pair of keyframes to what is told of it: a closure, a refusal, the objects under their ids."""
+"""From a registered pair of keyframes to what is reported of it: a closure, a refusal, the objects under their ids."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Waiting:
 
     @property
     def from_session(self) -> int:
-        """The session of the stored moment."""
+        """The session of the stored keyframe."""
         session = self.closure.from_session
         assert session is not None
         return session
@@ -104,7 +104,7 @@ def rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, target: Keyfram
 
 
 def redundant(seconds: float) -> Refusal:
-    """Why a constraint of two moments is not published of which another is known."""
+    """Why a constraint of two keyframes is not published where another of them is known."""
     return Reason.REDUNDANT, f"an accepted closure is nearer than {seconds} s"
 
 
@@ -177,7 +177,7 @@ def links_of(keyframe: Keyframe, item: Accepted, stored: Sequence[Sighting]) -> 
 def _moved(keyframe: Keyframe, item: Accepted) -> dict[str, float]:
     """How far the objects went that stand elsewhere now, under `MOVED`'s names; the farthest of several of one.
 
-    Of two without a name nobody knows whether they are the same.
+    Two without a name may or may not be the same.
     """
     found: dict[str, float] = {}
     for pair in (pair for pair in item.candidate.moved if pair.label != UNNAMED):

@@ -32,7 +32,7 @@ LEAST_MARGIN = 0.02  # of the view score over a perturbation: where nothing hold
 SUPPORTERS = 3  # that agree with it and each other
 LEAST_SHARE = 0.85  # of what is said of its place, that agrees
 OPPOSED_SHARE = 0.5  # what the gate accepts waits below
-HEARD = 1.0  # what weighs less opposes nothing: one that is certain
+COUNTS = 1.0  # what weighs less opposes nothing: one that is certain
 
 
 class Tried(NamedTuple):
@@ -129,11 +129,11 @@ def _confirmed(support: Support) -> bool:
 
 
 def _opposed(support: Support) -> bool:
-    return support.received >= HEARD and support.share < OPPOSED_SHARE
+    return support.received >= COUNTS and support.share < OPPOSED_SHARE
 
 
 def _by_odometry(tried: Tried) -> bool:
-    """Whether odometry told both poses: where our own tracking slipped, right poses contradict each other."""
+    """Whether odometry gave both poses: where our own tracking slipped, right poses contradict each other."""
     return tried.source.by_odometry and tried.target.by_odometry
 
 
@@ -161,8 +161,8 @@ def _refusal(tried: Tried) -> Refusal:
 def _refused(tried: Tried) -> Rejected:
     best, target = tried.registration.candidate, tried.target
     pose = None if best is None else best.T_target_source
-    told = rejected(target.stamp_ns, tried.source, _refusal(tried), target)
-    return replace(told, T_from_to=pose, evidence=tried.registration.evidence)
+    refused = rejected(target.stamp_ns, tried.source, _refusal(tried), target)
+    return replace(refused, T_from_to=pose, evidence=tried.registration.evidence)
 
 
 def _opposition(support: Support) -> Refusal:

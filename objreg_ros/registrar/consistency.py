@@ -19,8 +19,8 @@ from objreg_ros.keyframes.jitter import ENDS, Jitter, JitterMeter
 from objreg_ros.registration.keyframe import Keyframe
 
 REACH_M = 3.0  # of path, at both ends together, over which odometry carries a pose
-NEAR_M = 2.0  # of path: poses so near speak of the same place
-ROTATION_DEG, ROTATION_GROWTH_DEG_M = 2.0, 2.0  # between poses that agree: the noise of both, and of the way
+NEAR_M = 2.0  # of path: poses so near are of the same place
+ROTATION_DEG, ROTATION_GROWTH_DEG_M = 2.0, 2.0  # between poses that agree: the noise of both, and of the path
 TRANSLATION_M, TRANSLATION_GROWTH = 0.05, 0.06
 MEASURED_M = 1.0  # of path, over which jitter is measured: drift is little by then
 TOLERANCE_SIGMAS = 1.5  # times the root mean square of what is no jitter: 9 of 10 true poses agree then
@@ -68,7 +68,7 @@ class Support(NamedTuple):
     """What other statements say of one.
 
     ``agreeing`` counts those that agree with it and with each other, each of two keyframes of its own, one of them
-    ``sure`` or it itself is. Of all that speak of the same place, weighing ``received``, ``share`` agrees. What
+    ``sure`` or it itself is. Of all that concern the same place, weighing ``received``, ``share`` agrees. What
     disagrees by no more than odometry jitters is left out.
     """
 
@@ -111,7 +111,7 @@ class Consistency:
         return self._meter.jitter
 
     def add(self, statement: Statement) -> int:
-        """Take in a statement; its number. Forgets what nothing that comes can speak of any more."""
+        """Take in a statement; its number. Forgets what no later one can concern any more."""
         self._forget(statement.source)
         number, self._next = self._next, self._next + 1
         others = [n for n, other in self._statements.items() if _same_sessions(other, statement)]

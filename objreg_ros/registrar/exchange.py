@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Registrars that each keep a store of their own, and still close loops between their robots.
 
-A registrar tells the others a summary of each keyframe. Who finds places of its own alike asks for the keyframe, and
-compares it with those. Every pair of keyframes is looked at once: by the registrar that had its own when it known
-the other; where both were told before either was received, by that of the older one.
+A registrar sends the others a summary of each keyframe. One that has similar places asks for the keyframe, and
+compares it with those. Every pair of keyframes is looked at once: by the registrar that had its own when it received
+the other; where both were sent before either was received, by that of the older one.
 
 What is answered stays within bytes per second: askers take turns, each with the most promising. Names are believed of
 nobody: `peers/` says what a false one cannot do. Times are in s, of any clock that goes on.
@@ -77,7 +77,7 @@ class Exchange:
     def __init__(self, registrar: Registrar, robot: str, bytes_per_second: float = np.inf, run: str = "") -> None:
         self._registrar, self._robot, self.run = registrar, robot, run or uuid.uuid4().hex
         self._allowance, self._lock = Allowance(bytes_per_second), threading.Lock()
-        self._from_before = self._told = registrar.newest_keyframe  # ids up to these
+        self._from_before = self._announced = registrar.newest_keyframe  # ids up to these
         self._sessions = OrderedDict[tuple[str, int], int]()  # by run and session there, the number here
         self.counters: Counter[str] = Counter()
         self._peers, self._pending, self._wishes = Peers(robot), Pending(self.counters), Wishes(self.counters)
@@ -90,7 +90,7 @@ class Exchange:
     def announce(self, outcome: Outcome) -> bytes | None:
         """The summary of the keyframe that a search made, for all others.
 
-        None where it made none, or keeps it not, or where that is too large to be told.
+        None where it made none, or keeps it not, or where that is too large to be sent.
         """
         if outcome.keyframe_id is None:
             return None
@@ -102,7 +102,7 @@ class Exchange:
         sightings = sightings_of(named)
         name = Name(self.run, keyframe.keyframe_id)
         with self._lock:
-            self._told = name.keyframe_id
+            self._announced = name.keyframe_id
             summary = Summary(
                 name=name, frame_id=named.frame_id, clock=clock, sightings=sightings, received=self._peers.newest
             )
@@ -124,13 +124,13 @@ class Exchange:
         """
         summary = unpack_summary(packed)
         with self._lock:
-            told = self._told
+            announced = self._announced
             if not self._is_news(summary, packed, now):
                 return None
             session = self._session_here(summary.name.run, summary.sightings[0].session)
         sightings = [replace(sighting, session=session) for sighting in summary.sightings]
         found = self._registrar.places(sightings, summary.frame_id)
-        ours = [one for one in found if one.keyframe_id <= told and self._falls_to_us(one, summary)]
+        ours = [one for one in found if one.keyframe_id <= announced and self._falls_to_us(one, summary)]
         with self._lock:
             if not ours:
                 self.counters["dropped: unlike"] += 1

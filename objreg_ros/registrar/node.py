@@ -219,7 +219,7 @@ class RegistrarNode(FramesNode):
             )
 
     def extra_diagnostics(self) -> Mapping[str, object]:
-        """What is stored and what waits, and what was told of closures."""
+        """What is stored and what waits, and what was announced of closures."""
         stored = {f"stored {what}": count for what, count in self._counts.items() if what != "forgotten"}
         counts = {"stored unsearched": self._unsearched, "forgotten keyframes": self._counts["forgotten"]}
         counts |= {"waiting keyframes": len(self.searcher), "waiting poses": self._registrar.waiting}

@@ -72,10 +72,10 @@ class Recollection:
         return tuple(named)
 
     def ties_of(self, camera: tuple[str, str]) -> list[tuple[int, int, int]]:
-        """Session and stamp of the stored moment, and stamp of the other, of each closure to a robot's camera."""
+        """Session and stamp of the stored keyframe, and stamp of the other, of each closure to a robot's camera."""
         try:
             ties = [one for one in self.store.closures() if (one.to_robot, one.to_frame_id) == camera]
-        except StoreError:  # what is damaged is told where it is used
+        except StoreError:  # what is damaged is reported where it is used
             return []
         return [(one.from_session, one.from_ns, one.to_ns) for one in ties if one.from_session is not None]
 

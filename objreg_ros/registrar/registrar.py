@@ -32,7 +32,7 @@ from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 
-RECENT = 500  # landmarks that are told of after every keyframe
+RECENT = 500  # landmarks that are reported after every keyframe
 
 
 class Registrar:

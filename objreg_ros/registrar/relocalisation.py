@@ -34,8 +34,8 @@ from objreg_ros.registration.keyframe import Keyframe
 
 ALONE_ODDS = 1000.0  # of a closure that is believed by itself
 MOST = 64  # ties that are kept, the newest
-STEP = 0.05, 3.0  # m, degrees: less is no way, but the noise of odometry
-MOST_STEPS = 4096  # of way that are kept: a search of a keyframe ends later than the camera moves on
+STEP = 0.05, 3.0  # m, degrees: less is no motion, but the noise of odometry
+MOST_STEPS = 4096  # of the path that are kept: a search of a keyframe ends later than the camera moves on
 ROUNDS = 4  # of averaging rotations: the mean of poses that agree has settled by then
 
 
@@ -56,7 +56,7 @@ class Tie(NamedTuple):
     def carried(self, here: Standpoint, metres: float) -> tuple[Array, Array]:
         """The camera ``here`` in the map (4, 4) by this tie and odometry, and the covariance of that (6, 6).
 
-        ``metres`` is the way from the tie to there, in both sessions together: the earlier one has drifted too.
+        ``metres`` is the path from the tie to there, in both sessions together: the earlier one has drifted too.
         """
         one = self.statement
         T_map_here = self.T_map_odom @ here.T_session_camera
@@ -67,7 +67,7 @@ class Tie(NamedTuple):
 
 
 def drift(metres: float) -> Array:
-    """The covariance (6, 6) of so much way by odometry: what `consistency` allows is two deviations."""
+    """The covariance (6, 6) of so much path by odometry: what `consistency` allows is two deviations."""
     sigma = 0.5 * metres * np.array([TRANSLATION_GROWTH] * 3 + [np.radians(ROTATION_GROWTH_DEG_M)] * 3)
     return np.diag(sigma**2)
 
@@ -95,7 +95,7 @@ class Relocalisation:
         self._covariance: Array = np.eye(6)  # of the camera where the last tie was
         self._origin: Array = np.zeros(3)  # of that, in odometry
         self._path = TravelledPath(np.eye(4))
-        self._steps = deque([(began_ns, 0.0)], maxlen=MOST_STEPS)  # stamp, and the way until then
+        self._steps = deque([(began_ns, 0.0)], maxlen=MOST_STEPS)  # stamp, and the path until then
         self._way_until_tie = 0.0
         self._agreeing, self._target_ns, self._by_odometry = 0, 0, False
 
@@ -118,17 +118,17 @@ class Relocalisation:
             self._steps.append((stamp_ns, self._path.travelled))
 
     def _way_until(self, stamp_ns: int) -> float:
-        """Metres from the first frame to a moment, or to the earliest step that is kept."""
+        """Metres from the first frame to a stamp, or to the earliest step that is kept."""
         before = (metres for step_ns, metres in reversed(self._steps) if step_ns <= stamp_ns)
         return next(before, self._steps[0][1])
 
     def receive(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
-        """Take in a closure of these keyframes, the later one first; those of one session tell nothing."""
+        """Take in a closure of these keyframes, the later one first; those of one session add nothing."""
         with self._lock:
             is_of_now = source.session == self._session and source.stamp_ns >= self._began_ns
             if not is_of_now or target.session >= source.session:
                 return
-            if self._camera is None or not source.by_odometry:  # our own tracking tells no frame between keyframes
+            if self._camera is None or not source.by_odometry:  # our own tracking gives no pose between keyframes
                 self._go(source.stamp_ns, _pose_of(source))
             self._received[target.session] += 1
             tie = _tie(closure, source, target)

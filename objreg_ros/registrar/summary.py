@@ -53,11 +53,11 @@ class Name(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Summary:
-    """What others need to know of a keyframe to tell whether it may show a place of theirs.
+    """What others need to know of a keyframe to decide whether it may show a place of theirs.
 
-    ``sightings``, at least one, have their robot, session and positions as the registrar that tells it has them, and no
+    ``sightings``, at least one, have their robot, session and positions as the registrar that sends it has them, and no
     extent, score or camera. ``received`` has the newest keyframe of each other run that had been known when this one
-    was told.
+    was sent.
     """
 
     name: Name
@@ -159,7 +159,7 @@ def _summary(head: Head, rest: bytes) -> Summary:
     positions = _bounded("position", np.frombuffer(rest, "<f4", 3 * count).reshape(count, 3), limits.MOST_DISTANCE)
     descriptors = np.frombuffer(rest, "<f2", SIZE * count, 12 * count).reshape(count, SIZE)
     descriptors = _bounded("descriptor", descriptors, MOST_DESCRIPTOR).astype(np.float32)
-    told: dict[str, Any] = {
+    shared: dict[str, Any] = {
         "keyframe_id": _name(head).keyframe_id,
         "session": whole(head, "session", 0, MOST_WHOLE),
         "stamp_ns": whole(head, "stamp_ns", limits.LEAST_STAMP_NS, limits.MOST_STAMP_NS),
@@ -177,7 +177,7 @@ def _summary(head: Head, rest: bytes) -> Summary:
         clock=_clock(head),
         received=_received(head),
         sightings=tuple(
-            Sighting(instance=k, label=label, position=position, descriptor=descriptor, **told)
+            Sighting(instance=k, label=label, position=position, descriptor=descriptor, **shared)
             for k, (label, position, descriptor) in objects
         ),
     )

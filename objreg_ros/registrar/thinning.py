@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several closures of one revisit say the same thing many times. The first of each pair of moments is kept.
+"""Several closures of one revisit repeat each other. The first of each pair of keyframes is kept.
 
-Moments of different sessions may have one stamp, where they are of different robots.
+Keyframes of different sessions may have one stamp, where they are of different robots.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Iterable
 
 
 class Thinning:
-    """Knows the accepted closures of a run of the clock, and says whether a new pair of moments adds to them.
+    """Knows the accepted closures of a run of the clock, and says whether a new pair of keyframes adds to them.
 
-    A pair is of ``session`` and ``from_ns`` of the stored moment, and ``to_ns`` of the one that goes on.
+    A pair is of ``session`` and ``from_ns`` of the stored keyframe, and ``to_ns`` of the one that goes on.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -21,7 +21,7 @@ class Thinning:
         self._pairs: defaultdict[int, list[tuple[int, int, int]]] = defaultdict(list)  # by the span of the later one
 
     def redundant(self, session: int, from_ns: int, to_ns: int) -> bool:
-        """Whether an accepted closure joins moments that are both nearer than the span to these."""
+        """Whether an accepted closure joins keyframes that are both nearer than the span to these."""
         span = self._span_ns
         pairs = (pair for k in (-1, 0, 1) for pair in self._pairs.get(to_ns // span + k, ()))
         return any(one == session and abs(a - from_ns) < span and abs(b - to_ns) < span for one, a, b in pairs)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles or loads every kernel of the room before the first frame comes."""
+"""Compiles or loads every kernel of the registrar before the first frame comes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from objreg_ros.keyframes.warm import drawn
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.params import RegistrarParams
 
-GAP_S = 1.0  # beyond the least gap between two moments of a constraint
+GAP_S = 1.0  # beyond the least gap between two keyframes of a constraint
 
 
 def warm(params: RegistrarParams) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two keyframes in, poses with their evidence out, and a verdict. No store, no ROS.
 
-`align(source, target)` is the way of one pair from its keyframes to its verdict. The folders are the steps of that way,
+`align(source, target)` takes one pair from its keyframes to its verdict. The folders are its steps,
 and each imports only those before it (`test/test_layers.py`):
 
 kernels     where points land and which is the closest: compiled loops that all others begin with
@@ -40,7 +40,7 @@ def align(
     method: Method | None = None,
     gate: Gate | None = None,
 ) -> Registration:
-    """Register one pair: its way from two keyframes to the verdict.
+    """Register one pair: from two keyframes to the verdict.
 
     ``T_target_source`` of what comes back maps points of the source's camera into the target's. ``prior`` is what
     odometry expects, with its deviations (`propose.prior.expect`): a pose starts from it where it is tight, and is

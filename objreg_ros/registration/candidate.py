@@ -70,7 +70,7 @@ class Candidate:
     do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it, None
     where one is unknown; ``silhouette_score`` is that of the matched objects, -1..1, None where it is unknown, and
     ``silhouette_score_nearby`` that of each a little aside, where it looks most alike: what it is, if not where;
-    ``yaw_known`` says that the shape of one of them tells its yaw; ``margin_over_competing`` is how much higher the
+    ``yaw_known`` says that the shape of one of them fixes its yaw; ``margin_over_competing`` is how much higher the
     candidate scores than any other. ``perturbation_margin`` is the score margin over the pose perturbed to where it
     would be false, along the directions in which it is known least; None where it is known well enough without.
     ``surroundings`` is what the views say of it without the objects that it matches; None where those are small in

@@ -67,7 +67,7 @@ class Engine:
         pair = Pair(source=self._cache.get(source), target=self._cache.get(target))
         if min(len(pair.source.xyz), len(pair.target.xyz)) < LEAST_PAIRS:
             return ()
-        # propose/: what is worth finishing, of all that the proposers propose
+        # propose/: the hypotheses to finish, of all that the proposers propose
         best, hypotheses, of_keypoints = self._shortlist(pair, T_target_source_prior)
         if not best:
             return ()
@@ -78,7 +78,7 @@ class Engine:
         if competitors:
             candidates = merged([*candidates, *competitors], pair.source.middle)
         candidates = with_keypoints(pair, candidates, of_keypoints)
-        # certainty/: how the views resist a perturbation, and what gravity tells
+        # certainty/: how the views resist a perturbation, and what gravity adds
         perturbed = (self._perturbed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
         return tuple(self._gravity_updated(pair, one) for one in perturbed)
 
@@ -113,17 +113,17 @@ class Engine:
         return competitors
 
     def _promises(self, candidate: Candidate, best: Candidate) -> bool:
-        """Whether the gate may come to a candidate, so that it is worth perturbing."""
+        """Whether the gate may come to a candidate, so that it has to be perturbed."""
         least = max(LEAST_SCORE, best.verification.score - CONSIDERED_MARGIN)
         return candidate.verification.score >= least
 
     def _perturbed(self, pair: Pair, candidate: Candidate) -> Candidate:
         """The candidate with its score margin under perturbation, and what the views say without its objects."""
         asked = candidate, pair.source, pair.target
-        told = replace(
+        perturbed = replace(
             candidate, perturbation_margin=perturbation_margin_of(*asked), surroundings=surroundings_of(*asked)
         )
-        return self._regularised(pair, told)
+        return self._regularised(pair, perturbed)
 
     def _gravity_updated(self, pair: Pair, candidate: Candidate) -> Candidate:
         """The candidate brought within its covariance to where gravity is kept, and known better by it.
@@ -145,7 +145,7 @@ class Engine:
         return alignment if better is None else refine(source, target, better)
 
     def _regularised(self, pair: Pair, candidate: Candidate) -> Candidate:
-        """The candidate with what the views tell of a doubtful position that does not slide freely."""
+        """The candidate with what the views add to a doubtful position that does not slide freely."""
         alignment, C = candidate.alignment, spread_of(candidate.alignment)
         if candidate.perturbation_margin is None or len(alignment.degenerate) > 0:
             return candidate

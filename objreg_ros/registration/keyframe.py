@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The words inside the room: a keyframe, its objects and its context.
+"""The data types of the registrar: a keyframe, its objects and its context.
 
-A keyframe is a place that was seen for a moment: one or more frames that were close in time, fused in the camera frame
+A keyframe is a place that was seen at one time: one or more frames that were close in time, fused in the camera frame
 of one of them, its reference frame. It is what the store keeps and what the engine registers.
 """
 
@@ -60,10 +60,10 @@ class KeyObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Keyframe:
-    """A moment with its objects, context and view, all in the camera frame of the reference frame at ``stamp_ns``.
+    """A place with its objects, context and view, all in the camera frame of the reference frame at ``stamp_ns``.
 
     ``keyframe_id`` is unique in a store and grows with time, ``session`` counts the runs that wrote into it;
-    ``gravity (3,)`` is of length 1 or None, and ``gravity_confidence`` 0..1 how much was seen that tells it: next to
+    ``gravity (3,)`` is of length 1 or None, and ``gravity_confidence`` 0..1 how much was seen that fixes it: next to
     nothing for one view, 1 for many from around. ``T_odom_camera`` is the pose of the reference frame in the frame of
     its session, and says something about another keyframe of the same session only: the odometry's where
     ``by_odometry``, else that of our own tracking, which may slip unnoticed. Until then the camera had gone

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which labels may stand for the same thing: detectors split one object into cup and mouse, book and remote."""
+"""Which labels may stand for the same object: detectors split one object into cup and mouse, book and remote."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class KeyframeParams(Params):
 
 @dataclass(frozen=True)
 class RegistrarParams(KeyframeParams):
-    """Everything that a user may set in this room."""
+    """The parameters of the registrar."""
 
     method: str = param(
         "objreg", "how keyframes are registered; paper is the founding point-to-point ICP", choices=("objreg", "paper")
@@ -42,7 +42,7 @@ class RegistrarParams(KeyframeParams):
     max_megabytes: float = param(10000.0, "largest store; the oldest keyframes go first", "MB", ge=1.0)
 
     # Which stored keyframes a new one is compared with.
-    min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0, live=True)
+    min_gap: float = param(2.0, "least time between the two keyframes of a constraint", "s", ge=0.0, live=True)
     odometry_radius: float = param(
         1.0, "stored objects of the session that odometry puts farther away are not tried", "m", ge=0.0, live=True
     )
@@ -131,16 +131,16 @@ class RegistrarNodeParams(FramesParams):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        told = [words.split() or [""] for words in self.robots]
-        require_namespaces("robots", ["own" if robot == OWN else robot for robot, *_ in told])
-        for robot, *cameras in told:
+        robots = [entry.split() or [""] for entry in self.robots]
+        require_namespaces("robots", ["own" if robot == OWN else robot for robot, *_ in robots])
+        for robot, *cameras in robots:
             require_namespaces(f"robots: cameras of {robot}", cameras)
 
     @property
     def cameras(self) -> dict[str, tuple[str, ...]]:
         """The namespace of each robot, empty for this node's own, with those of its cameras below it, if they have."""
-        told = (words.split() for words in self.robots)
-        return {"" if robot == OWN else robot: tuple(cameras) for robot, *cameras in told}
+        robots = (entry.split() for entry in self.robots)
+        return {"" if robot == OWN else robot: tuple(cameras) for robot, *cameras in robots}
 
     @property
     def limit(self) -> float:

@@ -143,7 +143,7 @@ def test_frames_of_one_name_are_not_broadcast_and_that_is_said_once(
             word = replace(WALKS[robot][k], frame_id=frame)
             fleet.node._on_odometry(to_msg.odometry(word), f"fleet/{robot}")
     assert [message.child_frame_id for message in broadcaster.sent] == ["odom", "odom"]  # until b tells the same
-    assert len(said) == 1 and "two robots tell their odometry in 'odom'" in said[0]
+    assert len(said) == 1 and "two robots publish their odometry in 'odom'" in said[0]
 
 
 def test_a_saved_map_is_gone_on_with_by_both(fleet: Fleet) -> None:

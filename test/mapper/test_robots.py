@@ -108,7 +108,7 @@ def test_moments_of_one_robot_are_told_from_equal_ones_of_another() -> None:
 
 
 def test_a_closure_that_names_no_robot_where_two_may_be_meant_is_refused() -> None:
-    with pytest.raises(ValueError, match="names its sessions, as 2 runs of odometry have the moment 1000000000 ns"):
+    with pytest.raises(ValueError, match="names its sessions, as 2 runs of odometry have the stamp 1000000000 ns"):
         driven("a", "b").add_closure(closure(TRUE, 10, 60))
 
 

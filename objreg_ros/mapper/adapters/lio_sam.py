@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """LIO-SAM: topic ``lio_loop/loop_closure_detection``, std_msgs/Float64MultiArray.
 
-It takes no pose, so where the camera sits does not matter: it is told two moments, looks up its own keyframes for them
+It takes no pose, so where the camera sits does not matter: it takes two stamps, looks up its own keyframes for them
 and runs its own ICP between them.
 """
 
@@ -13,6 +13,6 @@ from objreg_ros.data import LoopClosure
 
 
 def fill_loop(message: Any, closure: LoopClosure) -> Any:
-    """The Float64MultiArray with exactly two numbers, in seconds: the later moment, then the earlier."""
+    """The Float64MultiArray with exactly two numbers, in seconds: the later stamp, then the earlier."""
     message.data = [1e-9 * max(closure.from_ns, closure.to_ns), 1e-9 * min(closure.from_ns, closure.to_ns)]
     return message

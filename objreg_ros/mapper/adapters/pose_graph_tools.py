@@ -18,9 +18,9 @@ LOOPCLOSE = 1
 
 
 def fill_edge(edge: Any, closure: LoopClosure, T_body_camera: Array, robot: int = 0) -> Any:
-    """The PoseGraphEdge of a closure, between the bodies at its two moments.
+    """The PoseGraphEdge of a closure, between the bodies at its two stamps.
 
-    ``T_body_camera (4, 4)`` is the camera's optical frame on the body that Hydra's odometry speaks of, the identity
+    ``T_body_camera (4, 4)`` is the camera's optical frame on the body of Hydra's odometry, the identity
     where that is the camera. Hydra reads the pose as ``T_to_from``, so the closure goes in inverted.
     """
     measured = Constraint(closure.T_from_to, closure.covariance)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A trajectory in the text of the TUM RGB-D benchmark: ``stamp tx ty tz qx qy qz qw``, for evo and its like."""
+"""A trajectory in the text of the TUM RGB-D benchmark: ``stamp tx ty tz qx qy qz qw``, for evo and similar tools."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def trajectory_text(path: Iterable[tuple[int, Array]]) -> str:
 
 
 def _seconds(stamp_ns: int) -> str:
-    """Not by a float, which has no room for the nanoseconds of a date."""
+    """Not by a float, which cannot hold the nanoseconds of a date."""
     whole, rest = divmod(abs(stamp_ns), SECOND_NS)
     return f"{'-' if stamp_ns < 0 else ''}{whole}.{rest:09d}"
 

@@ -29,7 +29,7 @@ class Asked(NamedTuple):
 
     @property
     def key(self) -> tuple[Moment, bytes]:
-        """What the answer has to have: its moment, and the labels and positions of its objects."""
+        """What the answer has to have: its keyframe, and the labels and positions of its objects."""
         first, seen = self.summary.sightings[0], self.summary.sightings
         moment = self.summary.name, first.stamp_ns, first.session, self.summary.frame_id
         return moment, repr([(one.label, one.position.tolist()) for one in seen]).encode()
@@ -47,7 +47,7 @@ class Pending:
 
     def __init__(self, counters: Counter[str]) -> None:
         self._counters = counters
-        self._asked: dict[tuple[Moment, bytes], Asked] = {}  # by moment and objects, the oldest first
+        self._asked: dict[tuple[Moment, bytes], Asked] = {}  # by keyframe and objects, the oldest first
 
     def __contains__(self, name: object) -> bool:
         return any(moment[0] == name for moment, _ in self._asked)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What gravity tells of a pose that surfaces and grey have found.
+"""What gravity says of a pose that surfaces and grey have found.
 
 Where depth errs systematically, two views of a floor tilt against each other, and a tilt of a degree is five
 centimetres over three metres. Gravity as a whole session felt it knows better. Both are weighed by their covariances:
@@ -52,7 +52,7 @@ class GravityUpdate(NamedTuple):
 def gravity_update(source: Prepared, target: Prepared, T_target_source: Array, C: Array) -> GravityUpdate | None:
     """The pose moved to where gravity is kept, as far as its covariance ``C (6, 6)`` [t r] leaves that open.
 
-    What a single view tells hardly counts here: the planes that told it are those that hold the pose. None where one
+    Gravity from a single view hardly counts here: its planes are those that hold the pose. None where one
     gravity is unknown.
     """
     if source.up is None or target.up is None or min(source.up_weight, target.up_weight) <= 0.0:

@@ -71,10 +71,10 @@ def _perturbed_score(source: Prepared, target: Prepared, T_target_source: Array)
 
 
 def margin_under_perturbation(source: Prepared, target: Prepared, T_target_source: Array, C: Array) -> float:
-    """The least score margin of the pose when it is perturbed any way where it is known least.
+    """The least score margin of the pose when it is perturbed in any direction where it is known least.
 
     ``C (6, 6)`` [t r] is its covariance in the target's axes. In the plane in which it is largest the pose is perturbed
-    all around as far as the last of `PERTURBATIONS_M`, the way that its errors go: a camera that looks at one far thing
+    all around as far as the last of `PERTURBATIONS_M`, along its errors: a camera that looks at one far object
     goes sideways and turns to keep looking at it.
     """
     angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
@@ -146,7 +146,7 @@ def regularising_information(source: Prepared, target: Prepared, T_target_source
     if texture(source.sight, target.sight, T_target_source) < HOLDING_CORRELATION:
         return added
     perturbed_score, left = PerturbedScore(source, target, T_target_source), np.eye(3)
-    for _ in range(3):  # every way once: the views say the same of it again
+    for _ in range(3):  # every direction once: the views say the same of it again
         spread = np.linalg.inv(known + added)
         values, vectors = np.linalg.eigh(left @ spread[:3, :3] @ left)
         if values[-1] <= DOUBTFUL_SIGMA_M**2:

@@ -14,7 +14,7 @@ from objreg_ros.registration.score.view_score import PHOTOMETRIC_POINTS, count_b
 class PerturbedScore:
     """A pose and how its view score falls when it is perturbed: ``score`` is V of itself.
 
-    A motion [t r] is of the source camera's pose in the target's axes. A fall is that of whichever grey tells more: in
+    A motion [t r] is of the source camera's pose in the target's axes. A fall is that of the more sensitive grey: in
     the images' own bands, or with one view laid into the other's image.
     """
 
@@ -25,7 +25,7 @@ class PerturbedScore:
         self.score = self._sharp(T_target_source, ways, self._quick)
 
     def margin(self, motion: Array) -> float:
-        """The score margin of the pose over itself after a motion either way, the way of the higher score."""
+        """The score margin of the pose over itself after a motion in either direction, that of the higher score."""
         return self.least_margin(np.array([-motion, motion]))
 
     def least_margin(self, motions: Array) -> float:

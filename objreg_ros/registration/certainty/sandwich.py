@@ -2,7 +2,7 @@
 """How well the surfaces hold a pose, by how much their patches contradict each other there.
 
 Points of one patch err together: depth that errs systematically moves whole surfaces, and counting its points as
-independent is what makes the covariance of an ICP over-confident. So each patch speaks once, with the sum of its
+independent is what makes the covariance of an ICP over-confident. So each patch counts once, with the sum of its
 residuals: the cluster-robust covariance H^-1 (sum of g g') H^-1 (White, "Maximum likelihood estimation of misspecified
 models", 1982; Liang and Zeger, "Longitudinal data analysis using generalized linear models", 1986), beside the usual
 H^-1. Points are weighed by the noise that their camera has at their depth.
@@ -67,7 +67,7 @@ def _weighed(
 
 
 def _patches(at: Array, normals: Array, edge: float) -> Array:
-    """The patch (n,) int64 that each point is of: a cube of space, and which way the surface faces; (3, n) each."""
+    """The patch (n,) int64 that each point is of: a cube of space, and the side that the surface faces; (3, n) each."""
     cells = np.concatenate([np.floor(at / edge), np.rint(normals)]).astype(np.int64) + 512
     return np.asarray(1024 ** np.arange(6, dtype=np.int64) @ cells)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gravity: both views know which way is down, more or less surely, and the pose must map one direction to the other."""
+"""Gravity: both views know the direction down, more or less surely, and the pose must map one to the other."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 
 A reading is a plain number, or None where it is not known. Depth tolerances have grown with the noise of the cameras
 before anything is read (`objreg_ros/sensor.py`), so a reading means the same for every camera. What a reading weighs is
-fitted (`weights`); here stands only which way it may: a weight never falls where the evidence gets better.
+fitted (`weights`); here stands only its direction: a weight never falls where the evidence gets better.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Kind(NamedTuple):
 
     read: Callable[[Candidate], float | None]
     knots: tuple[float, ...]  # ascending readings between which the weight is linear; it is constant beyond
-    rises: bool  # whether more of it speaks for a pose
+    rises: bool  # whether more of it supports a pose
     reason: Reason  # of a refusal for want of it
     words: str  # what a refusal calls it
 

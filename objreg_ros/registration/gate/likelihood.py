@@ -47,5 +47,5 @@ def check(candidate: Candidate, least_odds: float) -> Refusal | None:
     lacking = {name: max(WEIGHTS[name]) - weigh(name, reading) for name, reading in readings.items()}
     worst = max(lacking, key=lambda name: lacking[name])
     reading = readings[worst]
-    told = "unknown" if reading is None else f"{reading:.3g}"
-    return KINDS[worst].reason, f"odds {10.0**found:.2g} < {least_odds:g}, most for {KINDS[worst].words} {told}"
+    value = "unknown" if reading is None else f"{reading:.3g}"
+    return KINDS[worst].reason, f"odds {10.0**found:.2g} < {least_odds:g}, most for {KINDS[worst].words} {value}"

@@ -9,7 +9,7 @@ from objreg_ros.data import UNNAMED, Reason
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate.refusal import Refusal
 
-SEVERAL = 2  # matched objects; fewer tell where one thing is, and not which way the camera looked at it
+SEVERAL = 2  # matched objects; fewer locate one object, and not the direction from which the camera saw it
 LEAST_UNNAMED = 3  # matched objects without a name that make up for one with a name
 UNNAMED_COUNTS = 0.5  # of what an object with a name counts: any two of these may be taken for one
 SAME_EVIDENCE = {"centroids": "objects", "odometry": "objects", "keypoints": "features"}
@@ -19,7 +19,7 @@ by how many of them agree."""
 
 
 def is_lone(matched: Sequence[ObjectPair]) -> bool:
-    """Whether no second object speaks for the pose: what moved alone agrees with itself, whoever proposed it."""
+    """Whether no second object supports the pose: what moved alone agrees with itself, whoever proposed it."""
     return counted(matched) < SEVERAL
 
 
@@ -44,9 +44,9 @@ def check_moved(matched: float, moved: float) -> Refusal | None:
 def check_matched(matched: Sequence[ObjectPair], least_unnamed: int = LEAST_UNNAMED) -> Refusal | None:
     """Refuse a pose without a matched object: rooms that repeat themselves look the same.
 
-    One with a name is enough, or ``least_unnamed`` without: what these are nobody knows, so any may be another.
+    One with a name is enough, or ``least_unnamed`` without: their kind is unknown, so any may be another.
     """
     if any(pair.label != UNNAMED for pair in matched) or len(matched) >= least_unnamed:
         return None
-    told = f"0 objects < 1, {len(matched)} without a name < {least_unnamed}" if matched else "0 objects < 1"
-    return Reason.FEW_OBJECTS, told
+    detail = f"0 objects < 1, {len(matched)} without a name < {least_unnamed}" if matched else "0 objects < 1"
+    return Reason.FEW_OBJECTS, detail

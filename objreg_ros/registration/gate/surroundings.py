@@ -34,7 +34,7 @@ def check(
     """Refuse a pose that its surroundings do not confirm; ``labels`` are those of the matched objects.
 
     ``around`` is None where the objects are small in both views, none or many. ``lone`` says that fewer than two
-    objects speak.
+    objects count.
     """
     if around is None:
         return None

@@ -42,9 +42,9 @@ Made = TypeVar("Made")
 
 
 class AtNeed(Sequence[Made]):
-    """So many things that are made when they are first asked for: most objects meet none of their kind.
+    """So many items that are made when they are first asked for: most objects meet none of their kind.
 
-    For several threads: two that ask at once may both make a thing, and it is the same.
+    For several threads: two that ask at once may both make an item, and it is the same.
     """
 
     def __init__(self, count: int, make: Callable[[int], Made]) -> None:
@@ -73,10 +73,10 @@ class Prepared:
     """All that was seen, thinned: ``sight`` to look with and, at half its size, the one in ``halves``.
 
     The keypoints of its grey are in ``pictures``; ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to
-    align with; ``up (3,)`` is against gravity, or None, ``up_weight`` 0..1 how much was seen that tells it, and
+    align with; ``up (3,)`` is against gravity, or None, ``up_weight`` 0..1 how much was seen that fixes it, and
     ``up_sigma_deg`` the standard deviation of either tilt of it; ``groups`` the confusable group of each object,
     ``centroids (K, 3)`` their middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known``
-    whether that tells a turn; ``own`` is where the view shows each (h, w) bool; ``together`` holds all of them as one
+    whether that fixes a turn; ``own`` is where the view shows each (h, w) bool; ``together`` holds all of them as one
     shape; ``middle (3,)`` that of everything: where poses are compared.
     """
 
@@ -135,17 +135,17 @@ class Pair:
 def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     """Everything about one keyframe that does not depend on its partner.
 
-    Surface and features are made beside the rest: they let go of the interpreter. What is told of single objects is
+    Surface and features are made beside the rest: they let go of the interpreter. What is derived of single objects is
     made when it is asked for.
     """
     fine = thin(*seen(keyframe, params), SURFACE_VOXEL_M)
     coarse = thin(*fine, FEATURE_VOXEL_M)
-    things = thin(*of_objects(keyframe), OBJECT_VOXEL_M)
+    points = thin(*of_objects(keyframe), OBJECT_VOXEL_M)
     groups = LabelGroups(params.label_groups)
     up = None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float)
     seeing = params.context_range, DETAIL_SIGMA_PX, params.seed
     with ThreadPoolExecutor(1, "prepare") as beside:
-        surface = beside.submit(prepare_surface, *joined(fine, things), GRID_CELL_M, GRID_REACH_M)
+        surface = beside.submit(prepare_surface, *joined(fine, points), GRID_CELL_M, GRID_REACH_M)
         features = beside.submit(describe, *coarse, FEATURE_RADIUS_M)
         sight = prepare_sight(keyframe.view, *seeing)
         objects, drawn = keyframe.objects, (params.seed, sight.noise)
@@ -155,7 +155,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
             sight=sight,
             halves=AtNeed(1, lambda _: prepare_sight(halved(keyframe.view), *seeing)),
             pictures=AtNeed(1, lambda _: find_keypoints(keyframe.view, params.context_range)),
-            **_shuffled(*joined(coarse, sampled(things, OBJECT_POINTS, params.seed)), params.seed),
+            **_shuffled(*joined(coarse, sampled(points, OBJECT_POINTS, params.seed)), params.seed),
             up=up,
             up_weight=keyframe.gravity_confidence,
             up_sigma_deg=session_gravity_sigma_deg(keyframe.gravity_confidence),

@@ -45,8 +45,8 @@ def _around(source: Prepared, target: Prepared, candidate: Candidate) -> list[Ar
     They start in a grid of upright turns about the object and shifts across the vertical, where they do not agree with
     the candidate. None without grey or gravity in both.
     """
-    told = source.sight.textured and target.sight.textured and target.up is not None
-    if not told or REFINED == 0:
+    known = source.sight.textured and target.sight.textured and target.up is not None
+    if not known or REFINED == 0:
         return []
     grid, middle = _grid(source, target, candidate), source.middle
     beside = ~near(

@@ -22,7 +22,7 @@ from objreg_ros.registration.score.view_score import WORST, certain_violations, 
 OBJECT_BONUS = 0.25  # what a matched object adds to V when candidates are ranked
 FINISHED_MARGIN = 0.5  # score below the best at which a hypothesis is not finished
 CONSIDERED_MARGIN = 0.1  # V below the best at which a candidate is not considered: the next best is an alias
-NEARBY_M = 0.06  # how far along each axis an object may stand where it looks most alike, to tell what it is
+NEARBY_M = 0.06  # how far along each axis an object may stand where it looks most alike, to decide what it is
 MANY_MATCHES = 3  # matched objects that did not all move together, and make up for a plain print
 
 
@@ -87,7 +87,7 @@ def margin_over(candidate: Candidate, competitors: Iterable[Candidate]) -> float
     many where the two views see a large object from opposite sides. Occluded pixels count here as if they agreed.
 
     A positive silhouette score. The back of a box may bear the same print as its front, while the views share no side
-    of the box under the true pose. A negative score does speak against a pose, and counts.
+    of the box under the true pose. A negative score does count against a pose.
     """
     others = (_comparable_score(competitor).total for competitor in competitors if competitor is not candidate)
     return _comparable_score(candidate).total - max(others, default=WORST)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A closer look at upright poses of one object upon another, where the first look leaves doubt.
 
-Two sides of a thing share next to none of its surface. What it stands on tells where it is, by grey that is laid from
-one view into the other's image (`photometric`): a measure so sharp that it has to be asked near the truth, and several
-times as dear as `rank_score`. So it is asked of views at half size, about the poses that were found: farther and nearer
-along either line of sight, since it is the thickness of the thing that is not known, and turned half, since many a
-front looks like its back.
+Two sides of an object share next to none of its surface. What it stands on locates it, by grey that is laid from
+one view into the other's image (`photometric`): a measure so sharp that it has to be taken near the truth, and several
+times as costly as `rank_score`. So it is taken on views at half size, about the poses that were found: farther and
+nearer along either line of sight, since the thickness of the object is not known, and turned half, since many a front
+looks like its back.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from objreg_ros.registration.shapes.upright_search import SCORE_MARGIN
 
 SEARCHED = 2  # best poses of an object that are searched finely
 SIMPLEX_EVALUATIONS = 32  # most of one climb
-ALONG = (-0.4, -0.25, -0.12, 0.12, 0.25, 0.4)  # widths along a line of sight at which a thing may stand as well
-THICK = (0.0, 0.2, 0.4)  # usual thicknesses of a thing, in its widths: how far its back may lie behind its front
+ALONG = (-0.4, -0.25, -0.12, 0.12, 0.25, 0.4)  # widths along a line of sight at which an object may stand as well
+THICK = (0.0, 0.2, 0.4)  # usual thicknesses of an object, in its widths: how far its back may lie behind its front
 HOPELESS = -2.0  # score of what no climb brings up
 FIRST = np.array([[0.0, 0.0, 0.0], [0.08, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.02]])  # rad and m: of a descent
 LAST = {"xatol": 0.002, "fatol": 0.004}  # and where it ends

@@ -2,7 +2,7 @@
 """The registration of objects upon objects of their kind: one alone by its shape, several together as one shape.
 
 What each pair of look-alikes and the middles of all propose is judged by all objects as one, so that a can, whose own
-shape tells no yaw, gets it from where the others stand.
+shape fixes no yaw, gets it from where the others stand.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def from_shapes(source: Prepared, target: Prepared) -> list[Hypothesis]:
     """Poses that lay objects upon those of their kind, those of the best total score first.
 
     Upright as the objects stand; the best also drawn to all that was seen, or climbed to the best total score, where
-    that is higher: far views of a thin thing share nothing of it, and its room still tells where it is. A lone object
+    that is higher: far views of a thin object share nothing of it, and its surroundings locate it. A lone object
     whose best pose scores low even so gets a fine search.
     """
     pairs = shape_pairs(source, target)
@@ -72,7 +72,7 @@ def half_turned(source: Prepared, target: Prepared, pair: ObjectPair, T_target_s
     """The pose (4, 4) with a ``pair`` of objects turned half about their middle, where its total score is best.
 
     Front and back of a screen look alike, and the true pose, in which they share nothing, scores lower than the one
-    that lays them upon each other. Who has to tell them apart needs both. None where an object has no shape.
+    that lays them upon each other. A caller that has to separate them needs both. None where an object has no shape.
     """
     a, b = source.shapes[pair.source], target.shapes[pair.target]
     if a is None or b is None:
@@ -91,7 +91,7 @@ def _improved(
     motions: Array,
     objective: TotalScore,
 ) -> tuple[Array, Array]:
-    """Upright motions (K, 4) drawn to the room, then climbed, each where it scores higher; and their total scores."""
+    """Upright motions (K, 4) drawn to all that was seen, then climbed, where each scores higher; their total scores."""
     best, total_scores = motions.copy(), objective.of(motions)
     for better in (partial(_drawn, source, target, a, b), objective.climbed):
         tried = np.array([better(motion) for motion in best])

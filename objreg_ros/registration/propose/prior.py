@@ -33,16 +33,16 @@ class Prior:
 
 
 def expect(source: Keyframe, target: Keyframe, params: RegistrarParams) -> Prior | None:
-    """What is expected between two keyframes: the less certain, the longer the way between them was.
+    """What is expected between two keyframes: the less certain, the longer the path between them was.
 
     None where the two are of different sessions.
     """
     if source.session != target.session or source.T_odom_camera is None or target.T_odom_camera is None:
         return None
-    way, turn = abs(source.travelled - target.travelled), abs(source.turned - target.turned)
+    path, turn = abs(source.travelled - target.travelled), abs(source.turned - target.turned)
     return Prior(
         T_target_source=inverse(target.T_odom_camera) @ source.T_odom_camera,
         rotation_deg=params.odometry_rotation_noise + params.odometry_rotation_drift * turn,
-        translation_m=params.odometry_translation_noise + params.odometry_drift * way,
+        translation_m=params.odometry_translation_noise + params.odometry_drift * path,
         trusted=source.by_odometry and target.by_odometry,
     )

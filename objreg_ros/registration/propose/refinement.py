@@ -24,7 +24,7 @@ from objreg_ros.registration.score.object_matches import match_objects
 PHOTOMETRIC_ROUNDS = 3  # most times that grey finishes a pose, coarse to fine
 DEGENERATE_SHARE = 0.01  # a direction that a smaller share of the surface resists is degenerate
 HOLDING_CORRELATION = 0.45  # of grey from which on it resolves a degenerate direction
-LITTLE = 0.02  # gain in score after which another round is not worth its time
+LITTLE = 0.02  # gain in score after which another round costs more than it gains
 
 
 def refine(source: Prepared, target: Prepared, T_target_source: Array) -> Alignment:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From all that the proposers propose to the few hypotheses that are worth finishing.
+"""From all that the proposers propose to the few hypotheses that are finished.
 
 Hypotheses are drawn to the surface by ever more points, and those of the best view score go on. Yet shape alone may
 draw a right one away: where depth errs systematically, two views of a wall or of a table's top fit as well a decimetre
@@ -62,7 +62,7 @@ TILTED = 5.5  # deviations of gravity: what is not refined; photometric ICP may 
 
 
 class Shortlist(NamedTuple):
-    """What is worth finishing, the ``best`` first, ``hypotheses``: all that may agree with it, and ``of_keypoints``.
+    """What is to be finished, the ``best`` first, ``hypotheses``: all that may agree with it, and ``of_keypoints``.
 
     These are what the keypoints proposed, as they did: they may be rivals of it. What grey held where it was proposed
     agrees as it was proposed: it was chosen for being near, and drawn nearer.
@@ -195,7 +195,7 @@ def _scored(pair: Pair, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
 
 
 def _best(pair: Pair, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
-    """The distinct hypotheses of the best score that are worth finishing, best first."""
+    """The distinct hypotheses of the best score that are finished, best first."""
     scores = np.array([_total(hypothesis) for hypothesis in hypotheses])
     best = distinct(_poses(hypotheses), scores, pair.source.middle, FINISHED, AGREEING)
     return [hypotheses[k] for k in best if scores[k] >= scores.max() - FINISHED_MARGIN]

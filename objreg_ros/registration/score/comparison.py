@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which of two poses near each other has the better score of views and objects.
 
-The silhouette score of an object tells its front from its back, but not half a degree: whether a thin leg falls beside
-its pixels is chance. Grey that both views see much of tells where exactly a pose is, and grey that they see little of
-does not. So the objects have a say as far as the grey leaves doubt.
+The silhouette score of an object separates front from back, but not half a degree: whether a thin leg falls beside
+its pixels is chance. Grey that both views see much of locates a pose exactly, and grey that they see little of
+does not. So the objects count as far as the grey leaves doubt.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def score_locally(source: Prepared, target: Prepared, T_target_source: Array, ma
 def score_gain(other: LocalScore, own: LocalScore) -> float:
     """How much higher another pose scores than one's own, in units of V; below 0 where it scores lower.
 
-    Both are of the same matched objects. The surer grey speaks for both, so that one gains what the other loses.
+    Both are of the same matched objects. The surer grey counts for both, so that one gains what the other loses.
     """
     doubt = min(_doubt(score.seen) for score in (other, own))
     more_alike = other.silhouette_score - own.silhouette_score

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What matched keypoints say of a pose: how many it brings together, and how many more another pose does.
 
-They are counted by the cells of the picture that they lie in, so that the print of one thing, which may stand
+They are counted by the cells of the picture that they lie in, so that the print of one object, which may stand
 elsewhere, counts for as little as it covers.
 """
 

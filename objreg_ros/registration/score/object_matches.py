@@ -15,7 +15,7 @@ from objreg_ros.registration.shapes.silhouette_score import score_silhouettes
 from objreg_ros.sensor import depth_tolerance
 
 MATCHED_DISTANCE_M = 0.06  # two objects match if their centroids are this close
-MATCHED_SHARE = 0.28  # of its extent that a centroid may be farther: a large thing is never seen whole
+MATCHED_SHARE = 0.28  # of its extent that a centroid may be farther: a large object is never seen whole
 
 Pairs = tuple[ObjectPair, ...]
 

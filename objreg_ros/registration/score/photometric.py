@@ -20,7 +20,7 @@ from objreg_ros.registration.prepare.views import SHADELESS, SMOOTH, Sight
 from objreg_ros.registration.score.free_space import SHADED, SUM_A, SUM_AA, SUM_AB, SUM_B, SUM_BB, correlation
 from objreg_ros.sensor import depth_tolerance
 
-WINDOW = 15  # px: its mean is the slow part of grey; a wide one tells rooms apart best
+WINDOW = 15  # px: its mean is the slow part of grey; a wide one separates rooms best
 NARROW = 9  # px: sees best that a pose was perturbed
 CONTRAST = 3.0  # grey levels that are added to the contrast of a window: sensor noise is no print
 COVERED = 0.1  # weight of the points about a pixel from which on it has a grey

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the views say of a pose without the objects that speak for it.
+"""What the views say of a pose without the objects that support it.
 
 An object that has moved agrees with itself. Where it fills the views it outvotes everything that stayed, and so do two
 that moved together. So one or two that fill much of the views are left out, and what is around them is asked alone.

@@ -2,7 +2,7 @@
 """The total score of an upright pose, of the views and of the objects' silhouettes, and its climb.
 
 Objects that share next to nothing between two views are held by their silhouettes to some degrees only, or drawn
-together; the views tell the rest, and from far away: V rises over 20 degrees and 3 cm towards the true pose.
+together; the views fix the rest, and from far away: V rises over 20 degrees and 3 cm towards the true pose.
 """
 
 from __future__ import annotations

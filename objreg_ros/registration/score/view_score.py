@@ -87,7 +87,7 @@ def score_sharply(
     """V of one pose (4, 4) with all of the source's grey laid into the target's image: slower, and it falls by more.
 
     ``ways`` are what `count_both_ways` counted there, (10,) each. Grey one way, as the other says much the same; for
-    poses near each other, which tell a perturbation from none. Both views must have grey.
+    poses near each other, which separate a perturbation from none. Both views must have grey.
     """
     grey = correlation(compare(source, target, T_target_source, NARROW))
     return float(rated(*ways, grey, _asked(source, target, sample)))
@@ -108,7 +108,7 @@ def certain_violations(source: Sight, target: Sight, T_target_source: Array) -> 
     """The share of tested pixels that float beyond doubt, the worse way's: 1 where the views do not meet.
 
     In front of everything that the other view saw in a wide window, by more than twice the tolerance: edges are ragged
-    and a right pose is a little off, but a thing that is not there is larger than that.
+    and a right pose is a little off, but an object that is not there is larger than that.
     """
     ways = (source, target, T_target_source), (target, source, inverse(T_target_source))
     return max(_certain_violations(asked, seen, T) for asked, seen, T in ways)

@@ -21,18 +21,18 @@ from objreg_ros.registration.shapes.silhouette import Silhouette, draw
 
 EDGE = np.uint16(PointFlag.EDGE)
 LEAST = 30  # points of a shape
-LEVEL = 0.9  # cosine of a surface that things stand on with up
+LEVEL = 0.9  # cosine of a surface that objects stand on with up
 CLEAR = 0.005  # m: what an object stands on is at most so much higher than the lowest that is seen of it
 STEP = 0.02  # m: a level surface lies within as much of height
 SEEN = 5  # points of the context that make one
 LAYER = 0.05  # of the points of the widest: less is a rung or a rim, and nothing stands on it
 BESIDE, AROUND = 0.02, 0.25  # m beyond the object: nearer points may be its own
-WIDE = 0.6  # m beyond the object: what lies there in the same plane tells which way is up
+WIDE = 0.6  # m beyond the object: what lies there in the same plane gives the up direction
 THICK = (0.03, 0.02, 0.015, 0.015)  # m beside a plane, round by round
 PLANE = 60  # points that make one
 RIM = 0.02, 0.98  # of the points: between these an object is as wide as it looks
 NOWHERE = np.array([[np.inf, np.inf], [-np.inf, -np.inf]], np.float32)  # a box that holds nothing
-MOST_TILT = 4.0  # degrees between gravity and the normal of what things stand on
+MOST_TILT = 4.0  # degrees between gravity and the normal of what objects stand on
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,8 +2,8 @@
 """The outline of an object as one camera saw it, drawn finer than the view, with what the view saw beside and behind.
 
 Points of another sighting that fall beside the outline float in space that was seen to be free, unless something stands
-in front. That is what tells front from back and refuses turns that fit the points well: the reduced view is too coarse
-for it, but the object's own points are not.
+in front. That separates front from back and refuses turns that fit the points well: the reduced view is too coarse for
+it, but the object's own points are not.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ MARGIN = 6  # px around the object
 class Silhouette:
     """A window of a virtual camera: ``depth (h, w) float32`` m of the object inside and of what is behind beside it.
 
-    0 where nothing was measured; ``mask (h, w) uint8`` is BESIDE, INSIDE or RIM (too close to tell); ``grey (h, w)
+    0 where nothing was measured; ``mask (h, w) uint8`` is BESIDE, INSIDE or RIM (too close to decide); ``grey (h, w)
     float32`` is the object's own; ``camera (4,) float64`` fx fy cx cy of the window; ``tolerance (2,)`` is the camera's
     `silhouette_tolerance`.
 
-    ``inward (h, w, 2) int16`` px leads from each pixel to the nearest inside; ``edges (4,) bool`` tells which sides of
+    ``inward (h, w, 2) int16`` px leads from each pixel to the nearest inside; ``edges (4,) bool`` says which sides of
     the window, left, top, right and bottom, are those of the whole picture: nothing is known beyond.
     """
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well two shapes agree under an upright motion: the two-way visibility score on their silhouettes.
 
-A point on the other's surface speaks for a motion; one that floats in seen free space, beside the silhouette or before
-it, speaks a dozen times as loudly against it; one that is hidden says little. The grey tells the sides of a thing
-apart: where both are painted it should correlate, and if it does not, that speaks against the motion too.
+A point on the other's surface counts for a motion. One that floats in seen free space, beside the silhouette or before
+it, counts a dozen times as much against it. One that is hidden counts little. The grey separates the sides of an
+object: where both are textured it should correlate, and if it does not, that counts against the motion too.
 """
 
 from __future__ import annotations
@@ -115,8 +115,8 @@ def rated(out, n, weights):  # type: ignore[no-untyped-def]
     aa = max(0.0, out[SUM_AA] / m - (out[SUM_A] / m) ** 2)
     bb = max(0.0, out[SUM_BB] / m - (out[SUM_B] / m) ** 2)
     ab = out[SUM_AB] / m - out[SUM_A] / m * out[SUM_B] / m
-    told = (ab - expected * np.sqrt(aa * bb)) / np.sqrt((aa + noise) * (bb + noise))
-    painted = grey * told if out[SHADED] >= LEAST_SHADED else 0.0
+    correlated = (ab - expected * np.sqrt(aa * bb)) / np.sqrt((aa + noise) * (bb + noise))
+    painted = grey * correlated if out[SHADED] >= LEAST_SHADED else 0.0
     against = residual * out[RESIDUAL] + violated * out[VIOLATIONS] + hidden * out[HIDDEN]
     return (out[INLIERS] * (1.0 + painted) - against) / n
 

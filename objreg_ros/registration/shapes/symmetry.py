@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether an object's shape tells its yaw: a can or a bowl looks the same however it is turned.
+"""Whether an object's shape fixes its yaw: a can or a bowl looks the same however it is turned.
 
-Its surface tells it, or its outline: the round back of a chair lets it turn about the axis of the back, but then it
+Its surface fixes it, or its outline: the round back of a chair lets it turn about the axis of the back, but then it
 would stand where its camera saw through.
 """
 
@@ -16,11 +16,11 @@ from objreg_ros.registration.shapes.silhouette_score import COUNTS, VIOLATIONS, 
 TURN_SHARE = 0.16  # an object has no yaw if a smaller share of its surface resists a turn
 TURN_VIOLATIONS = 0.14  # it has one after all if so much of it, turned about its axis, is in seen free space
 TURNS = np.radians(np.arange(30, 360, 30))  # that an object is looked at under
-LEAST = 10  # points that tell anything
+LEAST = 10  # points that a yaw needs
 
 
 def shows_yaw(cloud: ObjectCloud, up: Array | None, shape: Shape | None) -> bool:
-    """Whether the surface of an object or its outline tells how it is turned; False where up is unknown."""
+    """Whether the surface of an object or its outline fixes its yaw; False where up is unknown."""
     if up is None:
         return False
     if yaw_share(cloud, up) >= TURN_SHARE:

@@ -162,7 +162,7 @@ def _finish(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _crowd(motion, others, n):  # type: ignore[no-untyped-def]
-    """How many others turn about as far: what looks much the same after half a turn keeps room for both."""
+    """How many others turn about as far: what looks much the same after half a turn keeps places for both."""
     count = 0
     for k in range(n):
         turn = (motion[0] - others[k, 0] + np.pi) % (2.0 * np.pi) - np.pi

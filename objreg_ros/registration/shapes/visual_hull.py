@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """An upright motion is moved out of seen free space, until each shape lies within the visual hull of the other.
 
-Two sides of an object that share no surface still tell where it stands: what the one camera saw must fall inside the
+Two sides of an object that share no surface still locate it: what the one camera saw must fall inside the
 outline that the other saw, or behind it. From a start that is decimetres off, where no point has a partner, each point
 that floats beside an outline is drawn to its rim, each that floats before the surface, behind it. (Laurentini, "The
 visual hull concept for silhouette-based image understanding", 1994.)
@@ -61,7 +61,7 @@ def clear(source, target, motion, most, rounds):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _step(A, g, motion):  # type: ignore[no-untyped-def]
-    """Move ``motion`` by the damped step of its normal equations; whether that was worth it."""
+    """Move ``motion`` by the damped step of its normal equations; whether it moved enough to go on."""
     A[1, 0], A[2, 0], A[2, 1] = A[0, 1], A[0, 2], A[1, 2]
     for k in range(3):
         A[k, k] += DAMPING[k]

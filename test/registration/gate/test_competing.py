@@ -16,7 +16,7 @@ def test_a_refusal_says_how_near_the_other_pose_comes() -> None:
     assert competing.check(0.1, 0.1) is None
     assert competing.check(0.05, 0.1) == (
         Reason.CHAINS_DISAGREE,
-        "another possible pose is worth 0.05 < 0.10 less",
+        "another possible pose scores 0.05 < 0.10 lower",
     )
 
 
