@@ -65,7 +65,7 @@ def _is_node(value: Any) -> bool:
 
 
 def _is_about(value: Any) -> bool:
-    """Whether it is what `about` makes; what is missing or null is not told."""
+    """Whether it is what `about` makes; fields may be missing or null."""
     if not isinstance(value, dict):
         return False
     model, params = value.get("model"), value.get("params", {})
@@ -75,7 +75,7 @@ def _is_about(value: Any) -> bool:
 
 
 def _each(fits: Check) -> Check:
-    """Whether a value is an object with nothing but such values."""
+    """Whether a value is an object with such values only."""
     return lambda value: isinstance(value, dict) and all(map(fits, value.values()))
 
 

@@ -33,8 +33,8 @@ Colour = tuple[int, int, int]
 def draw(found: StoreSummary, pictures: Mapping[int, Array]) -> Array:
     """A picture (H, W, 3) uint8 RGB of a store: every session from above, in m, then a contact sheet of its objects.
 
-    ``pictures`` are the portraits by landmark; a landmark without one is not on the sheet. Dots are landmarks, as large
-    as they were seen often, the line is the camera's way, and an arrow leads from where a moved object stood.
+    ``pictures`` are the portraits by landmark; a landmark without one is not on the sheet. Dots are landmarks, larger
+    the more often they were seen. The line is the camera's trajectory. An arrow begins where a moved object stood.
     """
     maps = session_maps(found)
     if not maps:

@@ -43,9 +43,9 @@ def test_findings_are_told_in_the_head_and_escaped() -> None:
     assert "<code>objreg inspect x</code>" in head and "no-images" in head
 
 
-def test_a_run_with_findings_does_not_say_that_nothing_was_sure_enough() -> None:
+def test_a_run_with_findings_does_not_say_that_no_candidate_was_certain_enough() -> None:
     told = {**summary(), "constraints": []}
-    assert view(told)["said"].endswith("nothing in this run was sure enough.")
+    assert view(told)["said"].endswith("no candidate was certain enough.")
     assert view({**told, "findings": [FINDING]})["said"] == "No loop was closed."
     assert view({"frames": 0, "constraints": []})["said"] == "No loop was closed."
 
