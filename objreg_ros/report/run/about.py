@@ -49,7 +49,7 @@ def commit(folder: Path | None) -> str | None:
         return None
     asked = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--exclude=*", f"--abbrev={DIGITS}"]
     try:
-        told = subprocess.run(asked, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
+        done = subprocess.run(asked, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
     except (OSError, subprocess.SubprocessError):
         return None
-    return told.stdout.strip() or None
+    return done.stdout.strip() or None

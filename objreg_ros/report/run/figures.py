@@ -82,7 +82,7 @@ def timeline(story: RunSummary, width: int = WIDE) -> str:
     heights = {name: 3 * LANE if name == "closures" else LANE for name in rows}
     level = dict(zip(rows, np.cumsum(list(heights.values())) - LANE / 2, strict=True))
     total = sum(heights.values())
-    end = max((story.seconds(moment) for moment in _moments(story)), default=1.0)
+    end = max((story.seconds(stamp_ns) for stamp_ns in _stamps_ns(story)), default=1.0)
     plot = Plot((0.0, end + 1e-9), (-float(total), 0.0), width, height=total + 46, left=150)
     plot.x_axis("s")
     for name in rows:
@@ -170,10 +170,10 @@ def closure_words(story: RunSummary, closure: LoopClosure) -> str:
     return ", ".join([times, *closure.labels, *moved, *truth])
 
 
-def _moments(story: RunSummary) -> list[int]:
-    moments = [glimpse.stamp_ns for glimpse in story.glimpses]
-    moments += [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
-    return [moment for moment in moments if story.in_time(moment)]
+def _stamps_ns(story: RunSummary) -> list[int]:
+    stamps_ns = [glimpse.stamp_ns for glimpse in story.glimpses]
+    stamps_ns += [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
+    return [stamp_ns for stamp_ns in stamps_ns if story.in_time(stamp_ns)]
 
 
 def _draw_detections(plot: Plot, story: RunSummary, level: dict[str, float]) -> None:
@@ -196,5 +196,5 @@ def _draw_closures(plot: Plot, story: RunSummary, row: float) -> None:
         rise = 2.4 * LANE * min(abs(closure.to_ns - closure.from_ns) / longest, 1.0)
         style = verdict(story, closure)
         plot.arc(start, end, -row, rise, style, closure_words(story, closure), f"c{k}")
-        for moment in (start, end):
-            plot.dot(moment, -row, style, closure_words(story, closure), 2.5, f"c{k}")
+        for seconds in (start, end):
+            plot.dot(seconds, -row, style, closure_words(story, closure), 2.5, f"c{k}")

@@ -229,14 +229,14 @@ def _simulated_model(counts: Counts, summary: Mapping[str, Any]) -> Finding | No
 
 def _overtaken(summary: Mapping[str, Any]) -> Finding | None:
     late = {
-        room: f"{counters['dropped'][OVERTAKEN]} of {counters['received']}"
-        for room, counters in summary.get("nodes", {}).items()
+        node: f"{counters['dropped'][OVERTAKEN]} of {counters['received']}"
+        for node, counters in summary.get("nodes", {}).items()
         if counters.get("dropped", {}).get(OVERTAKEN, 0) > MANY * counters.get("received", 0)
     }
     if not late:
         return None
     return Finding(
-        "frames were overtaken by newer ones: " + ", ".join(f"{room} {count}" for room, count in late.items()),
+        "frames were overtaken by newer ones: " + ", ".join(f"{node} {count}" for node, count in late.items()),
         "this machine is slower than the camera; that costs frames, and no closure is wrong for it",
         "play slower (--rate 0.5) or wait for every frame (--lossless); on a robot raise detector.threads and "
         "registrar.threads, or bound the search with registrar.search_seconds",

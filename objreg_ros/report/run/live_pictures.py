@@ -77,8 +77,10 @@ def draw_way(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
     try:
         from matplotlib.figure import Figure
     except ModuleNotFoundError as absent:
-        told = "expected matplotlib to draw the trajectory, found none; pip install 'objreg_ros[simulation]' brings it"
-        raise ModuleNotFoundError(told, name="matplotlib") from absent
+        lacking = (
+            "expected matplotlib to draw the trajectory, found none; pip install 'objreg_ros[simulation]' brings it"
+        )
+        raise ModuleNotFoundError(lacking, name="matplotlib") from absent
 
     positions = np.array([T[:3, 3] for T in truth.poses])
     axes = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)[2][:2]

@@ -46,8 +46,8 @@ class MessagesByStamp:
     def _indexed(self, stamp_ns: int) -> dict[int, Record]:
         """The records with the stamp that is nearest of all."""
         if self._index is None:
-            told = sorted((stamp, record.stamp_ns) for stamp, record in self._stamped())
-            self._index = np.array(told, np.int64).reshape(-1, 2)
+            stamps = sorted((stamp, record.stamp_ns) for stamp, record in self._stamped())
+            self._index = np.array(stamps, np.int64).reshape(-1, 2)
         if len(self._index) == 0:
             return {}
         recorded_ns = int(self._index[np.abs(self._index[:, 0] - stamp_ns).argmin(), 1])

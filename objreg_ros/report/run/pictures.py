@@ -75,7 +75,7 @@ class Album:
         try:
             depth = self._source.nearest(stamp_ns)
             if depth is None:
-                return _nothing_near(self._source, "the moment")
+                return _nothing_near(self._source, "the stamp")
             colour = None if self._image is None else self._image.nearest(from_msg.stamp_ns(depth))
             seen = self._depth_image(depth, colour)
         except (ValueError, OSError) as error:

@@ -69,8 +69,8 @@ def _is_about(value: Any) -> bool:
     if not isinstance(value, dict):
         return False
     model, params = value.get("model"), value.get("params", {})
-    told = [value.get(key) for key in ("version", "commit", "command", "date", "recording")]
-    fits = all(text is None or isinstance(text, str) for text in told)
+    texts = [value.get(key) for key in ("version", "commit", "command", "date", "recording")]
+    fits = all(text is None or isinstance(text, str) for text in texts)
     return fits and (model is None or isinstance(model, dict)) and isinstance(params, dict)
 
 

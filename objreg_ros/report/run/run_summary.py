@@ -43,8 +43,8 @@ class Tracks:
     @property
     def lines(self) -> dict[str, Array]:
         """The trajectories that there are, by name, in the order in which they are drawn."""
-        told = {self.source: self.odometry, "corrected": self.corrected}
-        return told if self.true is None else {"true": self.true, **told}
+        lines = {self.source: self.odometry, "corrected": self.corrected}
+        return lines if self.true is None else {"true": self.true, **lines}
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +96,12 @@ class RunSummary:
 
         Without frames, of all closures. A camera that starts before its clock stamps its first frames with 0.
         """
-        moments = sorted(glimpse.stamp_ns for glimpse in self.glimpses)
-        if not moments:
+        stamps_ns = sorted(glimpse.stamp_ns for glimpse in self.glimpses)
+        if not stamps_ns:
             ends = [stamp for closure in self.closures for stamp in (closure.from_ns, closure.to_ns)]
             return min(ends, default=0), max(ends, default=0)
-        pauses = [k for k in range(1, len(moments)) if moments[k] - moments[k - 1] > PAUSE_NS]
-        parts = [moments[a:b] for a, b in pairwise([0, *pauses, len(moments)])]
+        pauses = [k for k in range(1, len(stamps_ns)) if stamps_ns[k] - stamps_ns[k - 1] > PAUSE_NS]
+        parts = [stamps_ns[a:b] for a, b in pairwise([0, *pauses, len(stamps_ns)])]
         longest = max(parts, key=len)
         return longest[0], longest[-1]
 
@@ -151,8 +151,8 @@ class RunSummary:
     @property
     def left_out(self) -> int:
         """How many frames with a pose are not on the map because time does not advance at them."""
-        told = sum(glimpse.pose(self.by_tracking) is not None for glimpse in self.glimpses)
-        return told - len(self.map.frames) - self.map.frames_apart
+        posed = sum(glimpse.pose(self.by_tracking) is not None for glimpse in self.glimpses)
+        return posed - len(self.map.frames) - self.map.frames_apart
 
     def poses_before_and_after(self) -> tuple[list[int], list[Array], list[Array]]:
         """The stamps of the frames on the map, and the pose of the camera (4, 4) at each, before and ``T_map_camera``.

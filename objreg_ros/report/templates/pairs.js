@@ -41,10 +41,10 @@ function browse(article) {
     body.append(...known, ...rows.filter((row) => isNaN(value(row))));
   }
 
-  function picture(figure, uri, words) {
+  function picture(figure, uri, caption) {
     figure.hidden = !uri;
     if (uri) figure.querySelector("img").src = uri;
-    if (words) figure.querySelector("figcaption").textContent = words;
+    if (caption) figure.querySelector("figcaption").textContent = caption;
   }
 
   function listEvidence(numbers) {

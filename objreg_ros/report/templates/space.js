@@ -111,7 +111,7 @@
     constructor(place, direction, traces, chosen) {
       Object.assign(this, { direction, traces, chosen, open: false, turn: 0, drawing: Promise.resolve() });
       [this.button, this.notice, this.plot] = [".draw", ".notice", ".plot"].map((name) => place.querySelector(name));
-      this.words = this.button.textContent;
+      this.label = this.button.textContent;
       this.button.addEventListener("click", () => { this.open = !this.open; this.draw(); });
       spaces.push(this);
     }
@@ -124,7 +124,7 @@
 
     async drawNow() {
       this.button.setAttribute("aria-expanded", this.open);
-      this.button.textContent = this.open ? "Hide the 3D view" : this.words;
+      this.button.textContent = this.open ? "Hide the 3D view" : this.label;
       const drawn = this.open ? this.traces() : "";
       this.plot.hidden = typeof drawn === "string";
       this.notice.textContent = this.plot.hidden ? drawn : "";
@@ -159,12 +159,12 @@
     const pane = article.querySelector("dialog.pane"), stored = article.querySelector("script.clouds");
     if (!stored) return;
     const place = pane.querySelector(".space"), paint = place.querySelector(".paint");
-    const told = JSON.parse(article.querySelector("script.data").textContent).pairs;
+    const pairs = JSON.parse(article.querySelector("script.data").textContent).pairs;
     let clouds;
     const space = new Space(place, [0.2, -1.3, 0.5], () => {
       const key = place.dataset.pair;
       clouds ??= JSON.parse(stored.textContent);
-      if (clouds.poses[key]) return pair(clouds, told[key], key, paint.querySelector("select").value);
+      if (clouds.poses[key]) return pair(clouds, pairs[key], key, paint.querySelector("select").value);
       return `There are no clouds of this pair: ${clouds.absent[key] ?? "no pose was found for it"}.`;
     });
     paint.addEventListener("change", () => space.draw());

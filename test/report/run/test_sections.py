@@ -60,7 +60,10 @@ def test_without_odometry_the_truth_is_drawn() -> None:
     told = summary()
     told["glimpses"] = [{**row, "T_odom_camera": None} for row in told["glimpses"]]
     way = view(told)["way"]
-    assert "that of the ground truth" in way["words"] and [mark for mark, _ in way["legend"]] == ["true", "accepted"]
+    assert "is the ground truth" in way["words"] and [mark for mark, _ in way["legend"]] == [
+        "true",
+        "accepted",
+    ]
     assert 'data-pair="c0"' in way["drawing"]["wide"]
     assert "neither odometry nor ground truth" in view(told, Truth([]))["way"]["words"]
 
