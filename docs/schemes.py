@@ -178,7 +178,7 @@ SCHEMES = {
         line([(60, 40), (160, 35), (260, 40), (340, 35)], EARLIER),
         line([(60, 110), (160, 105), (260, 110), (340, 105)], NEW),
         *(arrow(x, 104, x, 44, EARLIER) for x in (80, 140, 320)), arrow(240, 106, 120, 42, WRONG),
-        words(200, 140, "the keyframes around it tell another pose"),
+        words(200, 140, "the keyframes around it support another pose"),
     ),
 }  # fmt: skip
 

@@ -24,10 +24,10 @@ from click.shell_completion import CompletionItem
 from objreg_ros.cli import verbosity
 from objreg_ros.whole_file import unwritten
 
-# What `objreg --help` says without importing a command. A name without its file is not shown.
+# The text of `objreg --help`, without importing a command. A name without its file is not shown.
 SUMMARIES = {
     "demo": "Run a recording through the live graph and show what came out.",
-    "inspect": "Say what is in a recording and what the graph would use of it, or what a store remembers.",
+    "inspect": "Show what is in a recording and what the graph would use of it, or what a store holds.",
     "offline": "Run a recording through the three stages, without ROS.",
     "batch": "Run many recordings, over the cores of this machine or a cluster.",
     "replay": "Publish a recording into the live graph.",
@@ -38,7 +38,7 @@ SUMMARIES = {
     "report": "Draw pictures and tables of a run.",
     "params": "Show every parameter, or write the files that are made from them.",
     "policy": "Show a policy of SROS 2: who may write, read and call what.",
-    "doctor": "Say whether a run can work here, and what is missing.",
+    "doctor": "Check whether a run can work here, and what is missing.",
 }
 FOLDER = Path(__file__).parent
 NAME = "objreg"
@@ -64,7 +64,7 @@ class LazyGroup(click.Group):
         return paths.guarded(verbosity.received_by(command))
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """What a tab brings: the commands without their import, and the options."""
+        """The completions of a tab: the commands without their import, and the options."""
         names = [name for name in self.list_commands(ctx) if name.startswith(incomplete)]
         items = [CompletionItem(name, help=SUMMARIES[name]) for name in names]
         return items + click.Command.shell_complete(self, ctx, incomplete)
@@ -75,9 +75,9 @@ class LazyGroup(click.Group):
             formatter.write_dl([(name, SUMMARIES[name]) for name in self.list_commands(ctx)])
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; with -v a broken input shows where it was met, before it is told.
+        """Run the command; with -v a broken input shows its traceback before its message.
 
-        A reader of the output who has left, as `head` does, ends it.
+        The command ends when the reader of its output has left, as `head` does.
         """
         try:
             return super().invoke(ctx)
@@ -104,12 +104,12 @@ def _tell_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
-    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_tell_version, help="Say which this is."
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_tell_version, help="Show the version."
 )
 def group() -> None:
     """Object-level loop closure: recordings, offline runs and the live graph.
 
-    `objreg COMMAND --help` says more of a command. -q and -v go before it or behind it.
+    `objreg COMMAND --help` describes a command. -q and -v go before it or behind it.
     """
 
 
@@ -117,11 +117,11 @@ verbosity.received_by(group)
 
 
 def main(*arguments: Any) -> None:
-    """The executable. A broken input is one line on stderr and exit 1; anything else is a bug and shows itself.
+    """The executable. A broken input is one line on stderr and exit 1; anything else is a bug and has a traceback.
 
     A run of which no frame got through ends with 3, as does the inspection of what the graph cannot run on.
 
-    SIGINT and SIGTERM end what was begun, with the usual status, and so does a reader of the output who has left.
+    SIGINT, SIGTERM and a reader of the output who has left end what was begun, with the usual status.
     """
     try:
         with _ended_by_signals():
@@ -150,7 +150,7 @@ def _named(error: Exception) -> Exception:
 
 
 def _leave_output() -> None:
-    """Let go of an output that takes nothing, so that Python's end does not try it again."""
+    """Close an output that takes nothing, so that Python does not try it again at its end."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -159,13 +159,13 @@ def _leave_output() -> None:
 def _ended_by_signals() -> Iterator[None]:
     """Within the block SIGTERM leaves through every `with` and `finally`, as Ctrl-C does.
 
-    Libraries receive them too: ROS shuts down, an import fails. What they say of that, even in place of the exit, is
-    no bug. Where one swallows the interrupt, as a compiler does that calls back into Python, it comes again.
+    Libraries receive them too: ROS shuts down, an import fails. Their messages, even in place of the exit, are no
+    bug. Where one swallows the interrupt, as a compiler that calls back into Python does, it comes again.
     """
-    told: list[int] = []
+    received: list[int] = []
 
     def end(number: int, _: object) -> None:
-        told.append(number)
+        received.append(number)
         if number == signal.SIGINT:
             raise KeyboardInterrupt
         sys.exit(TERMINATED)
@@ -174,10 +174,10 @@ def _ended_by_signals() -> Iterator[None]:
         try:
             yield
         except BaseException:  # a library may leave with a status of its own
-            if not told:
+            if not received:
                 raise
-        if told:  # also where the command came to its end, with an import less
-            sys.exit(INTERRUPTED if told[0] == signal.SIGINT else TERMINATED)
+        if received:  # also where the command came to its end, with an import less
+            sys.exit(INTERRUPTED if received[0] == signal.SIGINT else TERMINATED)
 
 
 @contextmanager
@@ -195,7 +195,7 @@ def _received(end: Any) -> Iterator[None]:
 
 @contextmanager
 def _never_swallowed() -> Iterator[None]:
-    """Within the block an interrupt that can be raised nowhere is no traceback: it comes again a moment later."""
+    """Within the block an interrupt that cannot be raised shows no traceback: it comes again shortly after."""
     before = sys.unraisablehook
 
     def come_again(unraisable: sys.UnraisableHookArgs) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who may write, read, serve and call what on the ROS graph, one entry a node. `objreg policy` writes it for SROS 2.
+"""The names that each node may write, read, serve and call on the ROS graph. `objreg policy` writes them for SROS 2.
 
 Names are those that a node gives: relative to its namespace, below the node itself (``~/``), or absolute.
 """

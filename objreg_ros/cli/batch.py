@@ -67,11 +67,11 @@ def command(recordings: tuple[Path, ...], out: Path, workers: int | None, schedu
 
 def _require_own_memory(asked: Asked) -> None:
     if asked.settings.of("registrar", RegistrarParams).store:
-        raise ValueError("registrar.store: expected none, since each recording has a memory of its own; leave it out")
+        raise ValueError("registrar.store: expected none, since each recording has its own memory; leave it out")
 
 
 def _waiting(work: BatchWork, recordings: Sequence[Path]) -> list[Path]:
-    """The recordings that are to be done; says what is done already, and what is done anew and why."""
+    """The recordings that are to be done; reports which are done already, and which are done anew and why."""
     differing = {recording: _differing(work, recording) for recording in recordings}
     done = sum(names == [] for names in differing.values())
     changed = Counter(name for names in differing.values() for name in names or ())
@@ -147,8 +147,8 @@ def _tell(rows: Sequence[Row], out: Path) -> None:
         click.echo(HEAD)
         for row in rows:
             click.echo(f"{row.name:32} {row.error}" if row.error else _line(row))
-    told = ", ".join(f"{count} {name}" for name, count in totals(rows).items())
-    click.echo(f"{told}; look at {out / PAGE}")
+    sums = ", ".join(f"{count} {name}" for name, count in totals(rows).items())
+    click.echo(f"{sums}; look at {out / PAGE}")
 
 
 def _line(row: Row) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is done of each recording of a batch, here or on another machine, and whether it was done before."""
+"""The work on each recording of a batch, here or on another machine, and whether it was done before."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class BatchWork:
     def of(cls, asked: Asked, folder: Path, arguments: tuple[str, ...]) -> BatchWork:
         """The work of these settings; OSError where there is no such model."""
         model = asked.settings.of("detector", DetectorParams).model
-        told = about(Path(), model, asked.settings.changed(), arguments)
-        made = {name: told[name] for name in ("version", "commit", "model")}
+        facts = about(Path(), model, asked.settings.changed(), arguments)
+        made = {name: facts[name] for name in ("version", "commit", "model")}
         made |= {"odometry": asked.odometry, "remaps": list(asked.remaps), "max_frames": asked.max_frames}
-        return cls(asked, folder, arguments, made | told["params"])
+        return cls(asked, folder, arguments, made | facts["params"])
 
     def __call__(self, recording: Path) -> None:
         """Run one recording and write its JSON whole, unless that is there already. OSError, ValueError as the run."""
@@ -96,15 +96,15 @@ class BatchWork:
 
 @dataclass(frozen=True, slots=True)
 class _Extent:
-    """What tells a recording from one that was written over it."""
+    """What distinguishes a recording from one that was written over it."""
 
     bytes: int
     changed_ns: int
 
     @classmethod
     def of(cls, recording: Path) -> _Extent:
-        told = [file.stat() for file in _files(recording)]
-        return cls(sum(one.st_size for one in told), max((one.st_mtime_ns for one in told), default=0))
+        stats = [file.stat() for file in _files(recording)]
+        return cls(sum(one.st_size for one in stats), max((one.st_mtime_ns for one in stats), default=0))
 
 
 def _files(recording: Path) -> Iterator[Path]:

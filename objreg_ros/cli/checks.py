@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run needs of a machine, one check a thing. None raises, and none needs what it asks for."""
+"""What a run needs of a machine, one check each. None raises, and none needs what it checks for."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ NEEDED = (
 EXTRAS = {  # module: the extra that brings it, and what for
     "distributed": ("batch", "many recordings at once"),
     "gtsam": ("mapper", "the mapper and corrected trajectories"),
-    "matplotlib": ("simulation", "the demo's picture of the way"),
-    "plotly": ("report", "what can be turned about in a report"),
+    "matplotlib": ("simulation", "the demo's picture of the trajectory"),
+    "plotly": ("report", "the views in 3D of a report"),
     "rerun": ("rerun", "recordings for the Rerun viewer"),
 }
 LEAST_DISK_BYTES = 1 << 29
@@ -48,9 +48,9 @@ KERNEL = "objreg_ros.registration.kernels.projection"
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that was looked at: what is there, and ``todo`` where that is to be mended.
+    """One check: what it found, and ``todo`` where something is to be mended.
 
-    ``stops`` is whether no run can work without that; else it is advice.
+    ``stops`` is whether no run can work without it; else it is advice.
     """
 
     section: str
@@ -61,7 +61,7 @@ class Check:
 
 
 def all_checks(environment: Mapping[str, str] = os.environ) -> Iterator[Check]:
-    """Every check, in the order in which they are told."""
+    """Every check, in the order of the output."""
     yield from of_package()
     yield from of_libraries()
     yield from of_modules()
@@ -123,7 +123,7 @@ def _is_installed(module: str) -> bool:
 def _trouble_of_import(module: str) -> str:
     try:
         import_module(module)
-    except Exception as error:  # whatever a broken installation says
+    except Exception as error:  # whatever a broken installation raises
         return f"{type(error).__name__}: {' '.join(str(error).split())}"
     return ""
 
@@ -161,7 +161,7 @@ def of_ros(environment: Mapping[str, str]) -> Iterator[Check]:
     for name in ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE"):
         yield Check("ROS", name, environment.get(name, "not set"))
     has_own = _is_installed("objreg_msgs")
-    todo = "" if has_own else "for closures with all that is known of them: build objreg_msgs with colcon"
+    todo = "" if has_own else "for closures with all their fields: build objreg_msgs with colcon"
     yield Check("ROS", "objreg_msgs", "there" if has_own else "absent: constraints alone", todo)
 
 
@@ -229,7 +229,7 @@ def compiled_code() -> Check:
 
 
 def _is_passing(folder: Path) -> bool:
-    """Whether it lies where nothing stays."""
+    """Whether it lies in shared memory or in the temporary folder."""
     places = [SHARED_MEMORY]
     with suppress(OSError):  # no temporary folder
         places.append(Path(tempfile.gettempdir()))

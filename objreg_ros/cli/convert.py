@@ -25,7 +25,7 @@ def command(recording: Path, out: Path, storage: str) -> None:
     """Write RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) as the rosbag2 folder OUT.
 
     The topics keep the QoS of their publishers; what ROS 1 latched becomes transient local. Topics of a type that ROS 2
-    does not ship, or not with the same fields, or whose name it does not allow, are left out, and named;
+    does not ship, or not with the same fields, or whose name it does not allow, are left out and listed;
     so are topics without messages.
     """
     with open_recording(recording) as source:

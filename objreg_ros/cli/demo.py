@@ -85,9 +85,8 @@ def command(**asked: Any) -> int:
     """Play RECORDING (or a simulated room) through three live nodes and show what came out.
 
     Ends with the counters of every node, latencies, constraints and their true error, and with pictures in the folder
-    of
-    --out. Of a recording that is no rosbag2, what the graph uses is written as one first. The last lines say whether it
-    worked, how well, and what to do next; it ends with 3 if no frame got through.
+    of --out. The inputs of a recording that is no rosbag2 are written as one first. The last lines report whether it
+    worked, how well, and what to do next. Ends with 3 if no frame got through.
     """
     return run(Asked(**asked))
 
@@ -101,14 +100,14 @@ def run(asked: Asked) -> int:
     bag = as_rosbag2(recording, inputs, asked.out, asked.seconds)
     with open_recording(bag) as opened:
         source = with_transforms(with_camera(opened, camera, inputs.outright))
-        logs, told = asked.out / "logs", told_of(asked, recording, source, inputs)
+        logs, summary = asked.out / "logs", told_of(asked, recording, source, inputs)
         live = run_live(bag, setup_of(asked, inputs, camera), logs, _say)
         truth = Truth.of(source, inputs.ground_truth)
         for note in truth.notes:
             _say(f"! {note}")
-        told = summary_of({**told, "logs": str(logs.resolve())}, live, truth)
-        findings = find(told, troubles(source, inputs))
-        write_whole(asked.out / "demo.json", json.dumps({**told, "findings": as_json(findings)}, indent=1))
+        summary = summary_of({**summary, "logs": str(logs.resolve())}, live, truth)
+        findings = find(summary, troubles(source, inputs))
+        write_whole(asked.out / "demo.json", json.dumps({**summary, "findings": as_json(findings)}, indent=1))
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
     write_report(asked.out / "report.html", [asked.out / "demo.json"])
@@ -119,12 +118,12 @@ def run(asked: Asked) -> int:
         click.echo()
     live_table.require_balance(live, sent)
     tell(findings)
-    click.echo("\n".join(closing_lines(told, findings, asked.out, own)))
-    return exit_code(told)
+    click.echo("\n".join(closing_lines(summary, findings, asked.out, own)))
+    return exit_code(summary)
 
 
 def told_of(asked: Asked, recording: Path, source: Recording, inputs: Inputs) -> dict[str, Any]:
-    """What the JSON tells of the recording, of which ``source`` was played, and of how the run was made."""
+    """The fields of the JSON on the recording, of which ``source`` was played, and on how the run was made."""
     changed = read_settings(asked.params_file, asked.changes).changed()
     return {
         "about": about(recording, model_of(asked), changed, sys.argv[1:]),
@@ -138,7 +137,7 @@ def told_of(asked: Asked, recording: Path, source: Recording, inputs: Inputs) ->
 
 
 def calibrated(asked: Asked) -> Asked:
-    """What is asked of a simulated room: what is so in simulation, unless something else is asked for."""
+    """The options for a simulated room: the settings that hold in simulation, unless others are given."""
     if asked.params_file is not None:
         return asked
     changed = {change.partition("=")[0] for change in asked.changes} | ({"detector.model"} if asked.model else set())
@@ -169,29 +168,29 @@ def _say(text: str) -> None:
 
 
 def setup_of(asked: Asked, inputs: Inputs, camera: str = "") -> Setup:
-    """The arguments of the nodes and of the player, which plays just these inputs, with the ``camera`` if told."""
+    """The arguments of the nodes and of the player, which plays just these inputs, with the ``camera`` if given."""
     everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
-    node_args = {room: list(everywhere) for room in ROOMS}
+    node_args = {node: list(everywhere) for node in ROOMS}
     named = {"model": asked.model, "labels": asked.labels}
-    changes = [f"{room}.reliable=true" for room in ROOMS if asked.lossless]
+    changes = [f"{node}.reliable=true" for node in ROOMS if asked.lossless]
     changes += [*(f"detector.{name}={value}" for name, value in named.items() if value), *asked.changes]
-    for room, name, value in map(parse_change, changes):
-        if room not in ROOMS:
-            raise ValueError(f"--set: expected a node of the demo ({', '.join(ROOMS)}), got {room}; leave it out")
-        node_args[room] += _override(room, ros_argument(name, value))
+    for node, name, value in map(parse_change, changes):
+        if node not in ROOMS:
+            raise ValueError(f"--set: expected a node of the demo ({', '.join(ROOMS)}), got {node}; leave it out")
+        node_args[node] += _override(node, ros_argument(name, value))
     replay = ["--lossless"] if asked.lossless else ["--rate", str(asked.rate)]
     replay += ["--camera", camera] if camera else []
     replay += [] if asked.seconds is None else ["--end", str(asked.seconds)]
     remaps = [f"{name}:={topic}" for name, topic in inputs.outright.items()]
-    return Setup(node_args, [*replay, *(word for remap in remaps for word in ("--remap", remap))])
+    return Setup(node_args, [*replay, *(argument for remap in remaps for argument in ("--remap", remap))])
 
 
-def _override(room: str, argument: str) -> list[str]:
-    """What sets a parameter of a node whatever its file says, for all nodes (``/**``) or for this one.
+def _override(node: str, argument: str) -> list[str]:
+    """The arguments that set a parameter of a node over its file, for all nodes (``/**``) or for this one.
 
-    To ROS the name that came last for the first time has the last word, so it is said for all and for the one.
+    In ROS the name whose first use comes last takes precedence, so the value is set for all nodes and for this one.
     """
-    return ["-p", argument, "-p", f"{room}:{argument}"]
+    return ["-p", argument, "-p", f"{node}:{argument}"]
 
 
 def _sent(source: Recording, inputs: Inputs, seconds: float | None, live: Live) -> dict[str, int]:
@@ -220,9 +219,9 @@ def _mounting_by_tf(source: Recording, inputs: Inputs) -> tuple[float, ...]:
 
 
 def camera_asked(asked: Asked) -> str:
-    """The camera that is told, by its option or by the segmenter's parameter; empty where none is."""
-    told = read_settings(asked.params_file, asked.changes).of("segmenter", SegmenterNodeParams).camera
-    return asked.camera or told
+    """The camera that is given, by its option or by the segmenter's parameter; empty where none is."""
+    by_parameter = read_settings(asked.params_file, asked.changes).of("segmenter", SegmenterNodeParams).camera
+    return asked.camera or by_parameter
 
 
 def model_of(asked: Asked) -> str:
@@ -231,10 +230,10 @@ def model_of(asked: Asked) -> str:
 
 
 def summary_of(told: Mapping[str, Any], live: Live, truth: Truth) -> dict[str, Any]:
-    """The run as JSON, after what is told of its recording."""
+    """The run as JSON, after the fields on its recording."""
     return {
         **told,
-        "nodes": {room: asdict(counters) for room, counters in live.counters.items()},
+        "nodes": {node: asdict(counters) for node, counters in live.counters.items()},
         "constraints": [constraint_with_error(closure, truth) for closure in live.closures],
         "rejected": dict(live.rejected),
         "truth": summarise(truth.errors(live.closures)),
@@ -264,7 +263,7 @@ def camera_of(source: Recording, inputs: Inputs) -> Intrinsics | None:
 
 
 def _image(source: Recording, inputs: Inputs, stamp_ns: int) -> ColourImage | None:
-    """The colour image of one moment."""
+    """The colour image with one stamp."""
     messages = (record.read() for record in source.records([inputs.image or ""]))
     found = next(
         (message for message in messages if message is not None and from_msg.stamp_ns(message) == stamp_ns), None

@@ -18,9 +18,9 @@ GOOD, ADVICE, PROBLEM = " ", "-", "!"
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="Say all of it as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print all of it as JSON.")
 def command(as_json: bool) -> int:
-    """Say whether a run can work here: libraries, packages, models, ROS, disk and what is compiled.
+    """Check whether a run can work here: libraries, packages, models, ROS, disk and what is compiled.
 
     What stops a run is marked with !, what a run does without with -, each with what to do. Ends with 0 where
     `objreg offline` can work, with 1 where it cannot. For bug reports.
@@ -49,7 +49,7 @@ def _say(checks: Sequence[Check]) -> None:
 
 
 def verdict(stopping: Sequence[Check]) -> str:
-    """The last word."""
+    """The verdict."""
     if not stopping:
         return "A run can work here."
     return f"No run can work here before this is mended ({len(stopping)}):"

@@ -28,14 +28,14 @@ AHEAD = 8  # chunks that wait to be written
 
 
 class Answer(NamedTuple):
-    """How the last of the servers answered; ``length`` of what is to come, in bytes, 0 where it does not say."""
+    """How the last of the servers answered; ``length`` of what is to come, in bytes, 0 where it gives none."""
 
     status: int
     length: int
 
 
 class Redirects(urllib.request.HTTPRedirectHandler):
-    """Checks each address before it is asked; what else a redirect says is not read."""
+    """Checks each address before it is asked; other parts of a redirect are not read."""
 
     def __init__(self, checked: bool) -> None:
         self._checked = checked

@@ -19,7 +19,7 @@ def command(store: Path, folder: Path) -> None:
     """Write the objects, contexts and closures of STORE into FOLDER, new or empty, as PLY clouds and one map.json.
 
     Clouds are in metres as doubles, in the frame of the session (of its odometry, or of its first camera). STORE is not
-    changed. Keyframes that are damaged are left out and named.
+    changed. Damaged keyframes are left out and listed.
     """
     written, damaged = 0, list[str]()
     for _ in tqdm(export(store, folder, damaged.append), desc="write", unit=" files", disable=None):

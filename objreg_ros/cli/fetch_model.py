@@ -27,7 +27,7 @@ MIRRORS = (
 
 @dataclass(frozen=True)
 class Source:
-    """A file that may be had from several places: its name here, its SHA-256 where it is known, the labels it needs."""
+    """A file that several places offer: its name here, its SHA-256 where it is known, the labels it needs."""
 
     file: str
     urls: tuple[str, ...]
@@ -47,7 +47,7 @@ MODELS = {
         "ssd_mobilenet_v1_12-int8.onnx", "45af75d9ddb063744277887ee27a658f7759980f7c1a87e21b53a11e7ae59627"
     ),
 }
-"""What can be had by name: the COCO models of the ONNX model zoo (Apache-2.0)."""
+"""The models by name: the COCO models of the ONNX model zoo (Apache-2.0)."""
 
 
 @click.command()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`objreg inspect`: what is in a recording and what the graph would use of it, or what a store remembers."""
+"""`objreg inspect`: what is in a recording and what the graph would use of it, or what a store holds."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ FILE = OutputPath(dir_okay=False, path_type=Path)
 @click.option("--picture", type=FILE, metavar="FILE.png", help="Draw the sessions of a store and its objects.")
 @click.option("--page", type=FILE, metavar="FILE.html", help="The same as a page, with what moved.")
 def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path | None, page: Path | None) -> int:
-    """Say what is in RECORDING, which topics the graph would use, and what would go wrong.
+    """Show what is in RECORDING, which topics the graph would use, and what would go wrong.
 
-    Takes its first frames as a run would, without a detector, and says what of the stream is not as it claims. Ends
-    with 3 where the graph cannot run on it, or would drop every frame.
+    Takes its first frames as a run would, without a detector, and reports where the stream differs from what it states.
+    Ends with 3 where the graph cannot run on it, or would drop every frame.
 
-    RECORDING may also be a store of the registrar: then its sessions, labels and objects are told, and what moved.
+    RECORDING may also be a store of the registrar: then it shows its sessions, labels and objects, and what moved.
     """
     if is_store(recording):
         _say_store(recording, picture, page)
@@ -73,8 +73,8 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
         tell([*warnings(source, inputs), *found])
     if not runs:
         return NOTHING
-    told = [f"--remap={remap}" for remap in remaps] + ([f"--camera={camera}"] if camera else [])
-    print_next("objreg", "offline", str(recording), *told, "--json", "run.json")
+    options = [f"--remap={remap}" for remap in remaps] + ([f"--camera={camera}"] if camera else [])
+    print_next("objreg", "offline", str(recording), *options, "--json", "run.json")
     return 0
 
 

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 ROOMS = ("detector", "segmenter", "registrar")
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
 DRAIN_S = 120.0  # the last searches
-QUIET_S = 3.0  # nothing moved for so long: all is through
+QUIET_S = 3.0  # no counter moved for so long: all is through
 
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """What came out of the live graph; ``counters`` by node, ``glimpses`` as in `offline`, without poses."""
+    """The results of the live graph; ``counters`` by node, ``glimpses`` as in `offline`, without poses."""
 
     counters: Mapping[str, Balance]
     rejected: Mapping[str, int]
@@ -56,8 +56,8 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
         say(f"starting three nodes ({FIRST_TIME})")
         _wait_for_nodes(collector, processes)
         say("playing")
-        words = ["replay", str(recording), *setup.replay_args]
-        player = processes.start("player", "objreg_ros.cli", words, quiet=is_quiet())
+        arguments_of_player = ["replay", str(recording), *setup.replay_args]
+        player = processes.start("player", "objreg_ros.cli", arguments_of_player, quiet=is_quiet())
         collector.spin_until(lambda: player.poll() is not None, float("inf"))
         processes.require_alive()
         say("waiting for the last frames")
@@ -69,17 +69,17 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
 
 
 def _programs(setup: Setup) -> list[tuple[str, str, list[str]]]:
-    """What is to be started: the name of its log, its module and its arguments."""
-    words = {room: list(setup.node_args.get(room, ())) for room in ROOMS}
+    """The processes to start: the name of the log, the module and the arguments of each."""
+    arguments = {node: list(setup.node_args.get(node, ())) for node in ROOMS}
     if setup.composed:
-        own = [_addressed(room, word) for room in ROOMS for word in words[room]]
+        own = [_addressed(node, argument) for node in ROOMS for argument in arguments[node]]
         return [("graph", "objreg_ros.graph", ["--ros-args", *own] if own else [])]
-    return [(room, f"objreg_ros.{room}.node", ["--ros-args", *own] if own else []) for room, own in words.items()]
+    return [(node, f"objreg_ros.{node}.node", ["--ros-args", *own] if own else []) for node, own in arguments.items()]
 
 
-def _addressed(room: str, word: str) -> str:
+def _addressed(node: str, argument: str) -> str:
     """A parameter or remap for one of several nodes of a process."""
-    return f"{room}:{word}" if ":=" in word else word
+    return f"{node}:{argument}" if ":=" in argument else argument
 
 
 def private_environment() -> dict[str, str]:
@@ -114,7 +114,7 @@ def _listening(environment: Mapping[str, str]) -> Iterator[Collector]:
 def _wait_for_nodes(collector: Collector, processes: Processes) -> None:
     def there() -> bool:
         processes.require_alive()
-        return {f"/{room}" for room in ROOMS} <= set(collector.counters)
+        return {f"/{node}" for node in ROOMS} <= set(collector.counters)
 
     if not collector.spin_until(there, START_S):
         raise ValueError(
@@ -141,5 +141,5 @@ def _state(collector: Collector) -> Any:
 
 def _patience(collector: Collector) -> float:
     """A frame that is worked on may take long; one that waits for a partner may wait for ever."""
-    working = any(collector.counters[f"/{room}"].waiting for room in ("detector", "registrar"))
+    working = any(collector.counters[f"/{node}"].waiting for node in ("detector", "registrar"))
     return DRAIN_S if working else QUIET_S

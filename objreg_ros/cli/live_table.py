@@ -16,32 +16,32 @@ def lines(live: Live, sent: Mapping[str, int], truth: Mapping[str, Any]) -> Iter
     ``sent`` is how many frames were sent to each node, ``truth`` as `objreg_ros.truth.summarise` gives it.
     """
     yield f"{'frames':<12}{'sent':>7}{'in':>7}{'out':>7}{'waiting':>9}  dropped"
-    for room in ROOMS:
-        yield _frames(room, sent[room], live.counters[room])
+    for node in ROOMS:
+        yield _frames(node, sent[node], live.counters[node])
     yield ""
     yield f"{'latency':<12}{'stage':<12}{'p50 ms':>9}{'p95 ms':>9}"
-    for room in ROOMS:
-        yield from _latencies(room, live.counters[room])
+    for node in ROOMS:
+        yield from _latencies(node, live.counters[node])
     yield ""
     yield f"constraints: {len(live.closures)}"
     yield f"rejected: {_counts(live.rejected)}"
     yield _errors(truth)
 
 
-def _frames(room: str, sent: int, counters: Balance) -> str:
+def _frames(node: str, sent: int, counters: Balance) -> str:
     dropped = dict(counters.dropped)
     if sent > counters.received:
         dropped["lost on the way"] = sent - counters.received
-    return f"{room:<12}{sent:>7}{counters.received:>7}{counters.published:>7}{counters.waiting:>9}  {_counts(dropped)}"
+    return f"{node:<12}{sent:>7}{counters.received:>7}{counters.published:>7}{counters.waiting:>9}  {_counts(dropped)}"
 
 
 def _counts(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items())) or "–"
 
 
-def _latencies(room: str, counters: Balance) -> Iterator[str]:
+def _latencies(node: str, counters: Balance) -> Iterator[str]:
     for stage, (p50, p95) in sorted(counters.stage_ms.items(), key=lambda item: item[0] == "total"):
-        yield f"{room:<12}{stage:<12}{p50:>9.1f}{p95:>9.1f}"
+        yield f"{node:<12}{stage:<12}{p50:>9.1f}{p95:>9.1f}"
 
 
 def _errors(truth: Mapping[str, Any]) -> str:
@@ -57,11 +57,11 @@ def _errors(truth: Mapping[str, Any]) -> str:
 
 def require_balance(live: Live, sent: Mapping[str, int]) -> None:
     """ValueError if a node received more than was sent to it, or if in is not out + waiting + dropped."""
-    for room in ROOMS:
-        counters = live.counters[room]
+    for node in ROOMS:
+        counters = live.counters[node]
         ended = counters.published + counters.waiting + sum(counters.dropped.values())
-        if counters.received != ended or counters.received > sent[room]:
+        if counters.received != ended or counters.received > sent[node]:
             raise ValueError(
-                f"{room}: expected in = out + waiting + dropped and no more than the {sent[room]} that were sent, "
+                f"{node}: expected in = out + waiting + dropped and no more than the {sent[node]} that were sent, "
                 f"got {counters.received} in and {ended} accounted for"
             )

@@ -44,7 +44,7 @@ FILE = OutputPath(dir_okay=False, path_type=Path)
 )
 @click.option("--kitti", type=FILE, help="Write it here as 12 numbers a pose, of the 3x4 matrix. KITTI has no stamps.")
 @click.option("--g2o", type=FILE, help="Write the corrected pose graph here, without the constraints that were pruned.")
-@click.option("--map", "cloud", type=FILE, metavar="FILE.ply", help="Write here what the keyframes saw, corrected.")
+@click.option("--map", "cloud", type=FILE, metavar="FILE.ply", help="Write the corrected cloud of the keyframes here.")
 @click.option(
     "--voxel",
     type=float,
@@ -64,7 +64,7 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
     write what comes out, in the frame in which it began. Poses are of the camera's optical frame, at every frame. Where
     the track is lost, they are those of the largest part that constraints tie together.
 
-    Says where the run stopped if no loop was closed, and ends with 3 if no frame got through.
+    Reports where the run stopped if no loop was closed. Ends with 3 if no frame got through.
     """
     asked = Asked.of(**{name: given.pop(name) for name in options.OF_RUN})
     outputs = Outputs.of(**given)
@@ -99,7 +99,7 @@ def _run(opened: Opened, registrar: RegistrarParams) -> Run:
 
 
 def _say_what_follows(recording: Path, json_file: Path | None) -> None:
-    """How one looks at the closed loops, unless this run is part of that already."""
+    """The command that shows the closed loops, unless this run is part of that already."""
     asked = click.get_current_context().find_root().invoked_subcommand
     if asked != "report" and json_file != STANDARD_OUTPUT:
         print_next("objreg", "report", str(json_file or recording))

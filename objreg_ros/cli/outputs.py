@@ -20,7 +20,7 @@ from objreg_ros.report.run.run_summary import RunSummary
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """The files that are asked for. What cannot come of a recording is said before the long run."""
+    """The files that are asked for. A file that a recording cannot give is refused before the long run."""
 
     files: MapFiles
     scenes: SceneFiles
@@ -49,7 +49,7 @@ class Outputs:
         return bool(self.files.wanted or self.scenes.wanted)
 
     def require_way(self, source: Recording, has_way: bool, has_truth: bool) -> None:
-        """ValueError where nothing will tell the way that is asked for: a map corrects one, a scene shows any.
+        """ValueError where nothing will give the trajectory: a map corrects one, a scene shows any.
 
         ``has_way`` is whether there is odometry, or the registrar's own tracking in its place.
         """
@@ -62,14 +62,14 @@ class Outputs:
         self.scenes.require_way(source.path, has_way or has_truth)
 
     def remembering(self, registrar: RegistrarParams, folder: str) -> RegistrarParams:
-        """With a store in a file, in ``folder`` unless it has one, where the map is made of what it remembers."""
+        """With a store in a file, in ``folder`` unless it has one, where the map is made of its keyframes."""
         if self.files.cloud is None or registrar.store:
             return registrar
         return registrar.replaced(store=str(Path(folder, "keyframes.db")))
 
     @aside()
     def write(self, story: RunSummary, album: Album, store: Path) -> None:
-        """Write what is asked for, and say what became of it; nothing of a run of which no frame got through."""
+        """Write what is asked for, and report it; nothing for a run of which no frame got through."""
         if not story.glimpses:
             return
         if self.scenes.wanted:

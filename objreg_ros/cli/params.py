@@ -50,7 +50,7 @@ def page_text() -> str:
 
 
 def yaml_text() -> str:
-    """A ROS 2 parameter file with every node's defaults, each with what it means."""
+    """A ROS 2 parameter file with every node's defaults, each with its meaning."""
     lines = [
         "# Made by `objreg params --write` from the code: change defaults there, and copies of this file here.",
         "# /**/ before a node's name stands for any namespace, and for none.",
@@ -71,8 +71,8 @@ def _yaml_lines(declaration: Declaration) -> list[str]:
 
 def _remark(declaration: Declaration) -> str:
     notes = [declaration.unit, declaration.range_text, "" if declaration.live else "read-only"]
-    told = ", ".join(note for note in notes if note)
-    return f"{declaration.doc} ({told})" if told else declaration.doc
+    notes_text = ", ".join(note for note in notes if note)
+    return f"{declaration.doc} ({notes_text})" if notes_text else declaration.doc
 
 
 def yaml_value(value: Any) -> str:

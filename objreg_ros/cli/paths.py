@@ -93,9 +93,9 @@ def guarded(command: click.Command) -> click.Command:
     if work is not None and not hasattr(work, "is_guarded"):
 
         @wraps(work)
-        def begin(*words: Any, **given: Any) -> Any:
+        def begin(*args: Any, **given: Any) -> Any:
             require_apart(command, given)
-            return work(*words, **given)
+            return work(*args, **given)
 
         begin.is_guarded = True  # type: ignore[attr-defined]
         command.callback = begin

@@ -55,18 +55,18 @@ def as_rosbag2(recording: Path, inputs: Inputs, out: Path, seconds: float | None
 def _mark(recording: Path, topics: Iterable[str], out: Path) -> str:
     """Eight digits that change with the place, the bytes and the time of a recording, and with what is taken of it.
 
-    What this command writes to ``out`` does not count, should that lie in the recording's folder.
+    Files that this command writes to ``out`` do not count, should it lie in the recording's folder.
     """
     place, own = recording.resolve(), out.resolve()
     files = [place] if place.is_file() else [file for file in place.rglob("*") if file.is_file()]
     stats = [file.stat() for file in files if own not in file.parents or own == place]
-    told = (str(place), sum(s.st_size for s in stats), max(s.st_mtime_ns for s in stats), sorted(topics))
-    return sha256(repr(told).encode()).hexdigest()[:8]
+    identity = (str(place), sum(s.st_size for s in stats), max(s.st_mtime_ns for s in stats), sorted(topics))
+    return sha256(repr(identity).encode()).hexdigest()[:8]
 
 
 @contextmanager
 def _whole(bag: Path) -> Iterator[Path]:
-    """Where it is written until it is whole; what fails leaves nothing."""
+    """Where it is written until it is whole; a failure leaves nothing."""
     bag.parent.mkdir(parents=True, exist_ok=True)
     unfinished = bag.with_name(f"{bag.name}.{os.getpid()}")
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`objreg policy`: who may write, read and call what, as a policy of SROS 2."""
+"""`objreg policy`: which node may write, read and call what, as a policy of SROS 2."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Asked:
     enclaves: str = ENCLAVES
 
     def nodes(self) -> dict[str, Access]:
-        """Our nodes, with what their parameters and remaps make of them."""
+        """Our nodes, as their parameters and remaps make them."""
         more = access.of_robots(self.robots)
         more["registrar"] += access.of_exchange(self.exchange)
         return {name: (own + more.get(name, Access())).renamed(self.remaps) for name, own in access.NODES.items()}
@@ -51,7 +51,7 @@ FILES = {
 
 @click.command()
 @click.option("--namespace", default="/", help="Namespace of the nodes, as /robot1.")
-@click.option("--remap", multiple=True, metavar="FROM:=TO", help="A topic that is elsewhere, as image:=/kinect/rgb.")
+@click.option("--remap", multiple=True, metavar="FROM:=TO", help="A topic of another name, as image:=/kinect/rgb.")
 @click.option("--robot", multiple=True, help="As one of the parameter robots: 'robot1', 'robot1 front rear'.")
 @click.option("--exchange", default="", help="As the registrar's parameter exchange: /fleet.")
 @click.option("--source", multiple=True, default=("camera",), help="Name of a node that writes what ours read.")
@@ -68,7 +68,7 @@ def command(
 ) -> None:
     """Show a policy of SROS 2 for the nodes: what each may write, read, serve and call.
 
-    Only our nodes write what is ours, only the operator calls services: docs/security.md says how it is used.
+    Only our nodes write our topics, only the operator calls services: docs/security.md describes its use.
     """
     if write:
         for file in write_files(Path(__file__).resolve().parents[2]):

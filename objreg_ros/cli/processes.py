@@ -51,5 +51,5 @@ class Processes:
         """ValueError with the last line of a process that has failed."""
         for name, process in self._running.items():
             if process.poll():
-                words = self.log(name).read_text(errors="replace").strip().splitlines() or ["nothing"]
-                raise ValueError(f"{name} ended with status {process.returncode}; its last line: {words[-1]}")
+                lines = self.log(name).read_text(errors="replace").strip().splitlines() or ["nothing"]
+                raise ValueError(f"{name} ended with status {process.returncode}; its last line: {lines[-1]}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording through the rooms as the options of a command ask: what `objreg offline` and `objreg batch` share."""
+"""A recording through the stages as the options of a command ask: what `objreg offline` and `objreg batch` share."""
 
 from __future__ import annotations
 
@@ -67,11 +67,11 @@ class Asked:
         max_frames: int | None,
         detections: str | None = None,
     ) -> Asked:
-        """What the options of `options.of_run` say; ValueError for what is refused before any recording is read."""
+        """The values of the options of `options.of_run`; ValueError for those refused before any recording is read."""
         _require_seed(odometry)
         named = {"detector.model": model, "detector.labels": labels, "segmenter.camera": camera}
-        words = [f"{name}={value}" for name, value in named.items() if value]
-        return cls(read_settings(params_file, [*changes, *words]), remaps, odometry, max_frames, detections)
+        by_option = [f"{name}={value}" for name, value in named.items() if value]
+        return cls(read_settings(params_file, [*changes, *by_option]), remaps, odometry, max_frames, detections)
 
     @property
     def drifts(self) -> bool:
@@ -86,10 +86,10 @@ class Asked:
 
     def of_recording(self, recording: Recording) -> Opened:
         """As `opened`, of a recording that is open already, be it one without a file. ValueError as that."""
-        told = self.settings.of("segmenter", SegmenterNodeParams)
-        camera = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
+        segmenter = self.settings.of("segmenter", SegmenterNodeParams)
+        camera = with_camera(recording, segmenter.camera, parse_remaps(self.remaps), segmenter.source)
         source = with_transforms(camera, self.odometry == TF)
-        inputs = self._inputs(source, told.source)
+        inputs = self._inputs(source, segmenter.source)
         recorded = choose_detections(source, self.detections) if self.detections else None
         return Opened(self, recording.path, source, inputs, Truth.of(source, inputs.ground_truth), recorded)
 
@@ -132,7 +132,7 @@ class Opened:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is odd about the recording, its truth and what is asked of it, for the user."""
+        """Notes for the user on the recording, its truth and the options."""
         registrar = self.asked.settings.of("registrar", RegistrarNodeParams)
         segmenter = self.asked.settings.of("segmenter", SegmenterNodeParams)
         is_told = registrar.mounting is not None or segmenter.level_odom
@@ -142,7 +142,7 @@ class Opened:
         return (*of_recording, *self.truth.notes, *left_out, *by_itself)
 
     def _choice(self, source: str) -> list[str]:
-        """Which camera was taken, where the recording has others that could be meant."""
+        """The camera that was taken, where the recording has others that could be meant."""
         remaps = parse_remaps(self.asked.remaps)
         others = alternatives(self.source.topics, first_frames(self.source), remaps, source)
         return [TAKEN.format(self.inputs.image, ", ".join(str(other.image) for other in others))] if others else []
@@ -164,7 +164,7 @@ class Opened:
         on_frame: Callable[[int], None] = lambda n: None,
         detects: Detects | None = None,
     ) -> Run:
-        """What comes out of the rooms; ``registrar`` and ``detects`` in place of what the settings say.
+        """The result of the stages; ``registrar`` and ``detects`` take the place of those of the settings.
 
         ``on_frame`` as in `run_offline`.
         """
@@ -172,7 +172,7 @@ class Opened:
         detector = settings.of("detector", DetectorParams)
         frames = frame_tree(self.source, camera_frame(self.source, self.inputs))
         timing = replace(self._timing(), frames=frames, max_rate=detector.max_rate)
-        rooms, close = build_rooms(
+        stages, close = build_rooms(
             detector,
             settings.of("segmenter", SegmenterParams),
             registrar or settings.of("registrar", RegistrarParams),
@@ -180,22 +180,22 @@ class Opened:
         )
         of_run = self.inputs, timing, self.asked.max_frames, on_frame, self.recorded
         try:
-            return run_offline(self._records(), rooms, *of_run)
+            return run_offline(self._records(), stages, *of_run)
         finally:
             close()
 
     def summary(self, run: Run, arguments: Sequence[str]) -> dict[str, Any]:
-        """The run as JSON, with what it was made with; ``arguments`` are what stood behind `objreg`."""
+        """The run as JSON, with its settings; ``arguments`` are those of `objreg`."""
         settings, model = self.asked.settings, self.asked.settings.of("detector", DetectorParams).model
-        told = settings.of("segmenter", SegmenterNodeParams)
+        segmenter = settings.of("segmenter", SegmenterNodeParams)
         return {
             "about": about(self.path, model, settings.changed(), arguments),
             "recording": str(self.path.resolve()),
             "inputs": self.inputs.outright,
             "odometry": self.odometry,
             "detections_from": self.recorded.topic if self.recorded else None,
-            "rectified": told.rectified,
-            "camera": absolute(told.camera),
+            "rectified": segmenter.rectified,
+            "camera": absolute(segmenter.camera),
             **setting(self.source, self.inputs, model),
             **run.summary(self.truth),
         }
@@ -229,7 +229,7 @@ class Opened:
 
 
 def _require_seed(odometry: str | None) -> None:
-    """ValueError for a drift that does not say its seed."""
+    """ValueError for a drift without a seed."""
     is_drift = odometry is not None and (odometry + ":").startswith(DRIFT)
     if is_drift and not str(odometry).removeprefix(DRIFT).isdecimal():
         raise ValueError(f"--odometry: expected drift: and a seed like drift:1, got {odometry!r}")

@@ -71,10 +71,10 @@ def command(
     depth_source: str,
     ros_args: tuple[str, ...],
 ) -> int:
-    """Publish RECORDING under the names that the nodes listen to.
+    """Publish RECORDING under the names that the nodes subscribe to.
 
     With --all, topics of a type that is not installed here, or that ROS 2 has with other fields, or whose name it does
-    not allow, are left out, and named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
+    not allow, are left out and listed. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
     With --lossless it ends with 3 if no frame got through.
     """
     from objreg_ros.bridge.node import profile
@@ -131,14 +131,14 @@ def _begun(player: Player) -> Iterator[Player]:
 
 
 def _mounts(source: Recording) -> dict[str, str]:
-    """The recording's /tf_static, which says how camera and IMU are mounted, where its type is installed."""
+    """The recording's /tf_static, which gives the mounting of camera and IMU, where its type is installed."""
     from objreg_ros.bridge.streams.player import is_installed
 
     return {topic: "/tf_static" for topic in static_topics(source)[:1] if is_installed(TRANSFORMS)}
 
 
 def playable_names(source: Recording, inputs: Inputs) -> dict[str, str]:
-    """Every topic that can be published, under its own name; the others are named to the user.
+    """Every topic that can be published, under its own name; the others are listed for the user.
 
     ValueError where one of those is an input of the graph.
     """
@@ -206,7 +206,7 @@ def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[
 
 @contextmanager
 def _told_at_the_end(player: Player, acknowledgements: Acknowledgements | None) -> Iterator[None]:
-    """Says what was sent, where a signal ends the play too."""
+    """Reports what was sent, also where a signal ends the play."""
     from objreg_ros.bridge.node.lifetime import shutdown_as_interrupt
 
     try:

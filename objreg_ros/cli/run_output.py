@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run was found to have, in the terminal, and the exit code that goes with it."""
+"""The findings on a run in the terminal, and the exit code for them."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ STILL = "all frames have the stamp {} ns, so none closes a loop: record them aga
 
 @contextmanager
 def json_to(file: Path | None) -> Iterator[Callable[[Any], None]]:
-    """What writes something as JSON into ``file``, or into standard output where that is ``-``.
+    """A function that writes a value as JSON into ``file``, or into standard output where that is ``-``.
 
-    In the latter case all else that is said within goes to standard error. Without a file nothing is written.
+    In the latter case all other output within goes to standard error. Without a file nothing is written.
     """
     if file != STANDARD_OUTPUT:
         yield lambda content: None if file is None else write_whole(file, json.dumps(content, indent=1))
@@ -41,7 +41,7 @@ def json_to(file: Path | None) -> Iterator[Callable[[Any], None]]:
 
 @aside()
 def print_run(run: Run, summary: Mapping[str, Any]) -> None:
-    """What came out of a run, in numbers."""
+    """The results of a run, in numbers."""
     click.echo(
         f"{run.frames} frames, {run.detections} detections, {run.objects} objects, {len(run.closures)} constraints"
     )
@@ -103,14 +103,14 @@ def print_trajectory(trajectory: Mapping[str, Any] | None) -> None:
 
 
 def print_reasons(refusals: Iterable[Rejected]) -> None:
-    """With -v a line for each refusal: both moments, the reason and the numbers behind it."""
+    """With -v a line for each refusal: both stamps, the reason and the numbers behind it."""
     for refused in refusals if is_verbose() else ():
         click.echo(f"  {refused.from_ns} to {refused.to_ns} ns: {refused.reason.value}: {refused.detail}")
 
 
 @aside()
 def tell(findings: Iterable[Finding], err: bool = False) -> None:
-    """A block for each finding: what is seen, and below it the likely cause and what to do."""
+    """A block for each finding: the symptom, and below it the likely cause and what to do."""
     for finding in findings:
         click.echo(f"! {finding.what}", err=err)
         if finding.cause:

@@ -85,10 +85,10 @@ class Settings:
 
     def changed(self) -> dict[str, Any]:
         """The values that are not the defaults, by ``node.parameter``."""
-        told = {(node, kind): self.of(node, kind) for node, kinds in NODES.items() for kind in kinds}
+        sections = {(node, kind): self.of(node, kind) for node, kinds in NODES.items() for kind in kinds}
         return {
             f"{node}.{declaration.name}": value
-            for (node, kind), params in told.items()
+            for (node, kind), params in sections.items()
             for declaration in kind.declarations()
             if (value := getattr(params, declaration.name)) != declaration.default
         }
@@ -110,7 +110,7 @@ def names_of(kind: type[Params]) -> list[str]:
 def read_settings(file: Path | None, changes: Iterable[str]) -> Settings:
     """Defaults, then a ROS 2 parameter file, then changes like ``registrar.method=paper``; ValueError if refused.
 
-    What the file says under ``/**`` goes to the nodes that have such a parameter.
+    Parameters of the file under ``/**`` go to the nodes that have them.
     """
     sections = {} if file is None else _sections(file)
     values = {node: _values_of(sections, node) for node in NODES}
@@ -134,7 +134,7 @@ def _require_good(file: Path | None, values: Mapping[str, Mapping[str, Any]]) ->
 
 
 def tell_ignored(settings: Settings) -> None:
-    """Say on stderr which sections of a parameter file are for none of our nodes: one may be misspelt."""
+    """Report on stderr which sections of a parameter file are for none of our nodes: one may be misspelt."""
     if settings.ignored:
         names = ", ".join(settings.ignored)
         click.echo(f"! ignored of the parameter file: {names}; the nodes are {', '.join(NODES)}", err=True)
@@ -143,14 +143,14 @@ def tell_ignored(settings: Settings) -> None:
 def ros_argument(name: str, value: Any) -> str:
     """``name:=value`` as ROS 2 reads it behind ``-p``, in the type of the value that `parse_change` gave.
 
-    A list is of one type to ROS and text that looks like a number is a number, unless it is in quotes: so has JSON it,
-    which is YAML too.
+    In ROS a list has one type, and text that looks like a number is a number unless it is in quotes. JSON has these
+    quotes, and is YAML too.
     """
     return f"{name}:={json.dumps(value, ensure_ascii=False)}"
 
 
 def _sections(file: Path) -> dict[str, dict[str, Any]]:
-    """The parameters under each name of a node, in the order of the file: the last word holds, as in ROS."""
+    """The parameters under each name of a node, in the order of the file: the last value holds, as in ROS."""
     try:
         sections = dict(_titled(dict(yaml.safe_load(read_text(file, SETTINGS_BYTES)) or {}), ""))
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
@@ -220,7 +220,7 @@ def _value(declaration: Declaration, text: str) -> Any:
 
 
 def _value_one(declaration: Declaration, text: Any) -> Any:
-    """What cannot be read as the declared type stays as it is, and is refused as that."""
+    """A value that cannot be read as the declared type stays as it is, and is refused as that."""
     if declaration.kind is str or not isinstance(text, str):
         return text
     try:

@@ -44,7 +44,7 @@ def _list(context: click.Context, _: click.Parameter, wanted: bool) -> None:
     show_default=True,
     help="The path of the camera; of three robots' in `robots`.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Decides all that is random.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all random numbers.")
 @click.option(
     "--frames", type=click.IntRange(2), default=600, show_default=True, help="Number of image pairs, of each robot."
 )
@@ -115,7 +115,7 @@ def _tell(out: Path, story: Story, scenario: str, seed: int, rate: float) -> Non
 
 
 def camera_of(name: str, size: str | None) -> Intrinsics:
-    """The camera of a name or of four numbers, scaled to ``size`` if it is given; ValueError says what is expected."""
+    """The camera of a name or of four numbers, scaled to ``size`` if it is given; ValueError states what it expects."""
     width, height = _size_of(size) if size else (0, 0)
     if name in CAMERAS:
         camera = CAMERAS[name]

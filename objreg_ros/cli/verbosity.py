@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much a command says: with -q errors and its result alone, with -v every reason too.
+"""How much a command prints: with -q errors and its result alone, with -v every reason too.
 
-Both are options of `objreg` and of each of its commands. What was asked for lies in click's context.
+Both are options of `objreg` and of each of its commands. The choice lies in click's context.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ QUIET, USUAL, VERBOSE = "quiet", "usual", "verbose"
 
 
 def _set(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
-    """Take down what was asked for; UsageError where both are."""
+    """Store the choice; UsageError where both are given."""
     if not wanted:
         return
     if context.meta.get(KEY, parameter.name) != parameter.name:
@@ -29,8 +29,8 @@ def _set(context: click.Context, parameter: click.Parameter, wanted: bool) -> No
 
 def _options() -> list[click.Option]:
     helps = {
-        ("-q", "--quiet"): "Say errors and the result alone.",
-        ("-v", "--verbose"): "Say every reason, and where an error came from.",
+        ("-q", "--quiet"): "Print errors and the result alone.",
+        ("-v", "--verbose"): "Print every reason, and where an error came from.",
     }
     return [
         click.Option(names, is_flag=True, expose_value=False, callback=_set, help=text) for names, text in helps.items()
@@ -40,7 +40,7 @@ def _options() -> list[click.Option]:
 def received_by(command: click.Command) -> click.Command:
     """The command with both options, if it has not got them.
 
-    With -q nothing that it says goes to standard error; what goes wrong is told when it has ended.
+    With -q it prints nothing to standard error; errors are printed when it has ended.
     """
     if not any(parameter.name == QUIET for parameter in command.params):
         command.params.extend(_options())
@@ -51,11 +51,11 @@ def received_by(command: click.Command) -> click.Command:
 
 def _hushed(work: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(work)
-    def received(*words: Any, **options: Any) -> Any:
+    def received(*args: Any, **options: Any) -> Any:
         if not is_quiet():
-            return work(*words, **options)
+            return work(*args, **options)
         with _nowhere() as nowhere, redirect_stderr(nowhere):
-            return work(*words, **options)
+            return work(*args, **options)
 
     return received
 
@@ -77,7 +77,7 @@ def _asked() -> str:
 
 @contextmanager
 def aside() -> Iterator[None]:
-    """What is said within is not the result: with -q it is not received. It decorates functions too."""
+    """Output within is not the result: with -q it is not printed. It decorates functions too."""
     if not is_quiet():
         yield
         return

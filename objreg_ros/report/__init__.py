@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What people and other programs get of a run.
+"""The outputs of a run, for people and for other programs.
 
 `run` is the page of a run, `store` that of a store, `batch` that of many recordings, `exports` are files of other
 programs. `page` and `write` make pages of templates; `drawing`, `packed` and `bundle` are what all of them draw with.

@@ -79,7 +79,7 @@ class Plot:
         self._add_stroke("path", f'd="{bow}"', style, title, pair)
 
     def text(self, x_px: float, y_px: float, words: str, anchor: str = "start", style: str = "label") -> None:
-        """Words at a place in pixels."""
+        """Text at a place in pixels."""
         self.parts.append(
             f'<text class="{style}" x="{x_px:.1f}" y="{y_px:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
         )
@@ -103,7 +103,7 @@ class Plot:
         self.text(4, TOP + 2, unit)
 
     def svg(self, title: str) -> str:
-        """The drawing; ``title`` is what a screen reader says."""
+        """The drawing; ``title`` is for screen readers."""
         return (
             f'<svg viewBox="0 0 {self.width} {self.height}" role="img" aria-label="{escape(title)}">'
             + "".join(self.parts + self.hits)

@@ -35,7 +35,7 @@ def page(chapters: Sequence[tuple[RunSummary, Album | None]]) -> str:
 
 @cache
 def environment() -> Environment:
-    """The templates; what they are given is escaped, and a name that it lacks is an error."""
+    """The templates; they escape their values, and a name that is not given is an error."""
     loader = FileSystemLoader(TEMPLATES)
     made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     made.globals["source"] = lambda name: loader.get_source(made, name)[0]

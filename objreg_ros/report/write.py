@@ -33,8 +33,8 @@ ODOMETRY_SLOP_NS = 20_000_000  # as the registrar's default
 def write_report(out: Path, runs: Sequence[Path]) -> list[str]:
     """Write one page about runs from the files of `objreg offline --json`, or of `objreg demo`.
 
-    The recording that a run names gives truth and pictures; where it is gone the page does without, and what comes back
-    says so, a line a run. ValueError for a file that is no run.
+    The recording that a run names gives truth and pictures. Where it is gone, the page does without; the result has one
+    line for each such run. ValueError for a file that is no run.
     """
     with ExitStack() as stack:
         chapters = [_chapter(file, stack) for file in runs]
@@ -56,33 +56,33 @@ def _chapter(file: Path, stack: ExitStack) -> tuple[RunSummary, Album | None]:
     inputs = choose_inputs(recording.topics, _inputs_of(summary, recording))
     T_base_camera = mounting(summary.get("T_base_camera", ()))
     glimpses = _with_odometry(summary.get("glimpses", ()), recording, inputs.odom, T_base_camera)
-    told = {**_of_nodes(summary), **summary, "glimpses": glimpses}
-    story = RunSummary.of(summary.get("name", place.resolve().name), told, Truth.of(recording, inputs.ground_truth))
+    complete = {**_of_nodes(summary), **summary, "glimpses": glimpses}
+    story = RunSummary.of(summary.get("name", place.resolve().name), complete, Truth.of(recording, inputs.ground_truth))
     return story, Album(recording, inputs, summary.get("rectified", "auto"))
 
 
 def _inputs_of(summary: Mapping[str, Any], recording: Recording) -> dict[str, str]:
-    """The inputs that the run took, as remaps; none where an older JSON does not tell.
+    """The inputs that the run took, as remaps; none where an older JSON lacks them.
 
     A topic that the recording lacks was made for the run, like an odometry that drifts: there is nothing to read.
     """
-    told = summary.get("inputs", {})
-    return {name: topic if topic in recording.topics else "" for name, topic in told.items()}
+    inputs = summary.get("inputs", {})
+    return {name: topic if topic in recording.topics else "" for name, topic in inputs.items()}
 
 
 def _with_odometry(
     glimpses: Sequence[Mapping[str, Any]], recording: Recording, topic: str | None, T_base_camera: Array | None
 ) -> list[Mapping[str, Any]]:
-    """The frames of a run, those that were told without a pose with the camera's by the recording's odometry.
+    """The frames of a run; those without a pose get the camera's pose by the recording's odometry.
 
     The odometry is of the body that carries the camera at ``T_base_camera``; None where the two are one. Without any
     frame, the odometry alone.
     """
     if any("T_odom_camera" in row for row in glimpses):
         return list(glimpses)
-    words = [pose_of(record) for record in (recording.records([topic]) if topic else ())]
+    odometry = [pose_of(record) for record in (recording.records([topic]) if topic else ())]
     T_body_camera = np.eye(4) if T_base_camera is None else T_base_camera
-    poses = {word.stamp_ns: (word.T_odom_body @ T_body_camera).tolist() for word in words if word is not None}
+    poses = {pose.stamp_ns: (pose.T_odom_body @ T_body_camera).tolist() for pose in odometry if pose is not None}
     rows = glimpses or [{"stamp_ns": stamp} for stamp in sorted(poses)]
     stamps = np.array(sorted(poses), np.int64)
     return [{**row, "T_odom_camera": poses.get(_nearest(stamps, row["stamp_ns"]))} for row in rows]
@@ -97,7 +97,7 @@ def _nearest(stamps: Array, stamp_ns: int) -> int:
 
 
 def _of_nodes(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """What the counters of live nodes tell: how many frames, and how long each stage took."""
+    """The counters of live nodes: how many frames, and how long each stage took."""
     nodes = summary.get("nodes", {})
     stages = {
         f"{node}: {stage}": {"p50": p50, "p95": p95}

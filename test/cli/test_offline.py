@@ -255,7 +255,7 @@ def test_a_voxel_of_no_size_is_refused_before_the_run(tmp_path: Path) -> None:
 def test_a_run_is_written_for_foxglove(model: Path, tmp_path: Path) -> None:
     folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "run.mcap"
     output = offline(folder, "--model", model, "--mcap", file, "--odometry", "none")
-    assert f"{file}: the way (true), 0 closures, 4 moments with picture and cloud" in output
+    assert f"{file}: the trajectory (true), 0 closures, 4 frames with picture and cloud" in output
     assert {record.topic for record in read(file)} >= {"/way/true", "/tf", "/camera/points"}
 
 

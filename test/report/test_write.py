@@ -41,7 +41,7 @@ def test_the_json_of_a_live_run_is_told_by_the_odometry_of_its_recording(tmp_pat
     (tmp_path / "demo.json").write_text(json.dumps(told))
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
     text = (tmp_path / "out.html").read_text()
-    assert "the way of the camera from above" in text and "segmenter: segment" in text
+    assert "the camera trajectory from above" in text and "segmenter: segment" in text
     assert ">29<" in text
 
 
@@ -62,7 +62,7 @@ def test_odometry_that_is_no_pose_is_passed_over(tmp_path: Path) -> None:
     run = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}}
     (tmp_path / "demo.json").write_text(json.dumps(run))
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
-    assert "the way of the camera from above" in (tmp_path / "out.html").read_text()
+    assert "the camera trajectory from above" in (tmp_path / "out.html").read_text()
 
 
 def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(

@@ -14,7 +14,7 @@ from objreg_ros.report.run.reasons import REFUSALS
 
 
 def batch_page(rows: Sequence[Row], about: Mapping[str, Any]) -> str:
-    """The HTML of a batch; ``about`` says by name what all its recordings were run with."""
+    """The HTML of a batch; ``about`` lists by name what all its recordings were run with."""
     whole = [row for row in rows if not row.error]
     refused = sum((Counter(row.rejected) for row in whole), Counter[str]())
     return environment().get_template("batch.html.j2").render(
@@ -28,11 +28,11 @@ def batch_page(rows: Sequence[Row], about: Mapping[str, Any]) -> str:
 
 
 def totals(rows: Sequence[Row]) -> dict[str, int]:
-    """What all recordings have together, by name; ``false`` only where a truth tells of any."""
-    told: dict[str, int] = {"recordings": len(rows), "failed": sum(bool(row.error) for row in rows)}
-    told |= {name: sum(getattr(row, name) for row in rows) for name in ("frames", "objects", "constraints")}
+    """What all recordings have together, by name; ``false`` only where a truth covers any."""
+    totals: dict[str, int] = {"recordings": len(rows), "failed": sum(bool(row.error) for row in rows)}
+    totals |= {name: sum(getattr(row, name) for row in rows) for name in ("frames", "objects", "constraints")}
     judged = [row.false for row in rows if row.false is not None]
-    return {**told, "false": sum(judged)} if judged else told
+    return {**totals, "false": sum(judged)} if judged else totals
 
 
 def _meaning(reason: str) -> str:

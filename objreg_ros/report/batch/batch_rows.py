@@ -50,6 +50,6 @@ class Row:
     @classmethod
     def failed(cls, recording: Path, error: Exception) -> Row:
         """The row of a recording that did not come to its end, with one line of why."""
-        why = " ".join(str(error).split()) or "no word of why"
-        is_told = isinstance(error, OSError | ValueError)
-        return cls(recording.name, str(recording), error=why if is_told else f"{type(error).__name__}: {why}")
+        why = " ".join(str(error).split()) or "no reason given"
+        is_expected = isinstance(error, OSError | ValueError)
+        return cls(recording.name, str(recording), error=why if is_expected else f"{type(error).__name__}: {why}")

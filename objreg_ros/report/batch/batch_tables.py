@@ -30,8 +30,8 @@ def require_pyarrow() -> ModuleType:
         import pyarrow
         import pyarrow.parquet
     except ModuleNotFoundError as absent:
-        told = "expected pyarrow, which writes Parquet, found none; pip install 'objreg_ros[batch]' brings it"
-        raise ValueError(told) from absent
+        lacking = "expected pyarrow, which writes Parquet, found none; pip install 'objreg_ros[batch]' brings it"
+        raise ValueError(lacking) from absent
     return pyarrow
 
 
@@ -57,10 +57,10 @@ class Tables:
     def add(self, row: Row, summary: Mapping[str, Any] | None) -> None:
         """A recording with its JSON; None where it failed."""
         self._sheets["recordings"].add(_items(asdict(row), "rejected", "stage_p50_ms"))
-        for told in () if summary is None else summary["constraints"]:
-            self._sheets["constraints"].add({"recording": row.recording, **_constraint(told)})
-        for told in () if summary is None else summary["refusals"]:
-            self._sheets["refusals"].add({"recording": row.recording, **_pair(told)})
+        for item in () if summary is None else summary["constraints"]:
+            self._sheets["constraints"].add({"recording": row.recording, **_constraint(item)})
+        for item in () if summary is None else summary["refusals"]:
+            self._sheets["refusals"].add({"recording": row.recording, **_pair(item)})
 
 
 class Sheet:
@@ -90,21 +90,21 @@ def _sheet(file: Any, schema: Any) -> Iterator[Sheet]:
         sheet.flush()
 
 
-def _pair(told: Mapping[str, Any]) -> dict[str, Any]:
+def _pair(pair: Mapping[str, Any]) -> dict[str, Any]:
     """A constraint or a refusal with its pose flat and its evidence as items."""
-    pose = told["T_from_to"]
+    pose = pair["T_from_to"]
     flat = None if pose is None else np.ravel(pose).tolist()
-    return {**_items(told, "evidence"), "T_from_to": flat}
+    return {**_items(pair, "evidence"), "T_from_to": flat}
 
 
-def _constraint(told: Mapping[str, Any]) -> dict[str, Any]:
-    error = told["error"]
+def _constraint(pair: Mapping[str, Any]) -> dict[str, Any]:
+    error = pair["error"]
     judged = {
         "error_rotation_deg": error and error["rotation_deg"],
         "error_translation_cm": error and error["translation_cm"],
         "false": error and not within((error["rotation_deg"], error["translation_cm"]), FALSE),
     }
-    return {**_pair(told), "covariance": np.ravel(told["covariance"]).tolist(), **judged}
+    return {**_pair(pair), "covariance": np.ravel(pair["covariance"]).tolist(), **judged}
 
 
 def _items(row: Mapping[str, Any], *names: str) -> dict[str, Any]:

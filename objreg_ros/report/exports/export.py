@@ -33,9 +33,9 @@ def export(path: str | Path, folder: str | Path, tell: Callable[[str], None] = l
     ``contexts/keyframe_<id>.ply`` what was around it, both in m in the frame of the session. Their points are doubles,
     since that frame may be UTM's, where a float steps by half a metre. ``map.json`` holds keyframes with their objects
     (``frames`` is how many showed one, ``density`` in points per square metre of it), the landmarks that those are of,
-    closures, and the ids of the keyframes that are ``damaged``: they are left out, and ``tell`` receives why.
+    closures, and the ids of the keyframes that are ``damaged``: they are left out, and ``tell`` receives the reason.
     StoreError (an OSError) if it is no store, OSError if there is anything in the folder already or it cannot be
-    written: then nothing of the export stays.
+    written: then nothing of the export remains.
     """
     folder = Path(folder)
     _refuse_used(folder)
@@ -69,7 +69,7 @@ def _write(store: Store, folder: Path, tell: Callable[[str], None]) -> Iterator[
 
 @contextmanager
 def _all_or_nothing(folder: Path) -> Iterator[None]:
-    """Take away what was written into a new or empty folder where that does not come to its end."""
+    """Remove what was written into a new or empty folder where the export does not come to its end."""
     was_there = folder.exists()
     try:
         yield
@@ -147,8 +147,8 @@ def _landmark_json(known: Landmark) -> dict[str, Any]:
 
 def _closure_json(closure: LoopClosure) -> dict[str, Any]:
     """A closure as it is stored: without the poses of single objects, with its cameras."""
-    told = {name: value for name, value in constraint(closure).items() if name != "objects"}
-    return {**told, "from_frame_id": closure.from_frame_id, "to_frame_id": closure.to_frame_id}
+    fields = {name: value for name, value in constraint(closure).items() if name != "objects"}
+    return {**fields, "from_frame_id": closure.from_frame_id, "to_frame_id": closure.to_frame_id}
 
 
 def constraint(closure: LoopClosure) -> dict[str, Any]:

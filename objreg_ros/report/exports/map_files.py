@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The corrected map of a run as files that other programs read: its way, its pose graph and what the camera saw."""
+"""The corrected map of a run as files that other programs read: its trajectory, its pose graph and its cloud."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.whole_file import write_whole
 
 VOXEL_M = 0.02  # finer than what a depth camera errs by at 2 m
-OF_AN_OBJECT = 100.0  # so much surer is the colour of an object than the grey of a reduced picture
+OF_AN_OBJECT = 100.0  # weight of an object's colour over the grey of a reduced picture
 SAME_POSE = 1e-6  # m, and of the entries of a rotation
 
 
@@ -123,7 +123,7 @@ def _why_no_map(story: RunSummary) -> str:
 
 
 def _keyframes(path: Path, tell: Callable[[str], None]) -> Iterator[Keyframe]:
-    """The keyframes of a store, the oldest first; those that are damaged are left out and told of."""
+    """The keyframes of a store, the oldest first; those that are damaged are left out and reported."""
     store = Store(path, read_only=True)
     try:
         for keyframe_id in store.keyframe_ids():

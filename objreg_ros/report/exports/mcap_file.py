@@ -27,11 +27,11 @@ LINE_M, BALL_M, WORD_M = 0.01, 0.05, 0.05
 
 
 def write_mcap(file: Path, scene: RunScene) -> int:
-    """Write a scene as a single .mcap file; how many moments with picture and cloud it has comes back.
+    """Write a scene as a single .mcap file; returns how many frames with picture and cloud it has.
 
-    ``/way/NAME`` (Path), ``/closures`` and ``/objects`` (MarkerArray) come at the first moment and stay. ``/tf`` leads
+    ``/way/NAME`` (Path), ``/closures`` and ``/objects`` (MarkerArray) come at the first stamp and stay. ``/tf`` moves
     the frame ``camera`` through the map, with ``/camera/image/compressed``, ``/camera/camera_info`` and
-    ``/camera/points``. OSError where the file cannot be written; nothing is left of it then.
+    ``/camera/points``. OSError where the file cannot be written; then it leaves no file.
     """
     with folder_for(file) as folder:
         bag = folder / "run"

@@ -18,7 +18,7 @@ KINDS = {"<f8": "double", "<f4": "float", "u1": "uchar"}
 def write_ply(path: Path, xyz: Array, normals: Array | None = None, rgb: Array | None = None) -> Path:
     """Write points (N, 3) as binary little-endian PLY: x y z as doubles, and normals as floats and colours, if any.
 
-    Not by Open3D, which writes no empty cloud and says of a full disk that all is well. The folder is made.
+    Not by Open3D, which writes no empty cloud and reports no error on a full disk. The folder is made.
     """
     columns = list(zip(AXES, ["<f8"] * 3, xyz.T, strict=True))
     if normals is not None:

@@ -31,17 +31,17 @@ def require_rerun() -> ModuleType:
     try:
         import rerun
     except ModuleNotFoundError as absent:
-        told = "--rerun: expected the Rerun SDK, found none; pip install 'objreg_ros[rerun]' brings it"
-        raise ValueError(told) from absent
+        lacking = "--rerun: expected the Rerun SDK, found none; pip install 'objreg_ros[rerun]' brings it"
+        raise ValueError(lacking) from absent
     return rerun
 
 
 def write_rerun(file: Path, scene: RunScene) -> int:
-    """Write a scene as an .rrd file; how many moments with picture and cloud it has comes back.
+    """Write a scene as an .rrd file; returns how many frames with picture and cloud it has.
 
-    Below ``map/``: ``ways``, ``closures`` by verdict and ``objects`` that stay; and on the timeline ``time`` the
-    ``camera`` with its image and the ``cloud`` that it saw. ValueError without the SDK, OSError where the
-    file cannot be written; nothing is left of it then.
+    ``map/`` holds ``ways``, ``closures`` by verdict and ``objects``, which stay. The timeline ``time`` holds the
+    ``camera`` with its image and its ``cloud``. ValueError without the SDK, OSError where the
+    file cannot be written; then it leaves no file.
     """
     rr = require_rerun()
     with folder_for(file) as folder:
@@ -65,7 +65,7 @@ def _log_ways(rr: ModuleType, recording: Any, scene: RunScene) -> None:
 
 
 def _log_closures(rr: ModuleType, recording: Any, edges: tuple[Edge, ...]) -> None:
-    """A line for each closure; its labels and its true error show where one points at it."""
+    """A line for each closure; its labels and its true error show when the pointer is over it."""
     for verdict in dict.fromkeys(edge.verdict for edge in edges):
         of = [edge for edge in edges if edge.verdict == verdict]
         lines = rr.LineStrips3D(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run as things in space, for viewers: ways of the camera, closures, objects, and what it saw."""
+"""A run in 3D, for viewers: trajectories of the camera, closures, objects, and camera views."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WIDTH = 320  # px of a picture
 MOST_POINTS = 6000  # of a cloud
 MOST_MOMENTS = 200  # with picture and cloud
 FARTHEST_M = 6.0  # what is farther errs by decimetres
-LEAST_COMMON = 3  # poses that truth and map have to have in common to be laid over each other
+LEAST_COMMON = 3  # poses that truth and map must share for their alignment
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class Way:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edge:
-    """A closure between two places, ``ends (2, 3)`` m, with its labels and true error in words.
+    """A closure between two places, ``ends (2, 3)`` m, with its labels and true error as text.
 
     ``verdict`` is ``accepted``, ``pruned`` by the mapper, or ``false`` where truth says so.
     """
@@ -49,7 +49,7 @@ class Edge:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """What a ``camera`` saw at one moment: ``rgb (H, W, 3)``, and points ``xyz (N, 3)`` m in it with ``colours``."""
+    """The view of a ``camera`` at one time: ``rgb (H, W, 3)``, and points ``xyz (N, 3)`` m in it with ``colours``."""
 
     stamp_ns: int
     T_map_camera: Array
@@ -63,8 +63,9 @@ class Moment:
 class RunScene:
     """A run in the frame in which odometry began; ``ways`` are ``odometry``, ``corrected`` and, if known, ``true``.
 
-    ``tracked`` stands for ``odometry`` where the way is that of our own tracking. Without either the one way is the
-    true one, in the frame of the truth. ``objects`` are labels with positions (3,) m, one for each frame that saw one.
+    ``tracked`` stands for ``odometry`` where the trajectory is that of our own tracking. Without either, the one
+    trajectory is the true one, in the frame of the truth. ``objects`` are labels with positions (3,) m, one for each
+    frame that saw one.
     """
 
     name: str
@@ -75,11 +76,11 @@ class RunScene:
 
     @property
     def main(self) -> Way:
-        """The way on which the camera is shown."""
+        """The trajectory on which the camera is shown."""
         return self.ways["corrected"] if "corrected" in self.ways else self.ways["true"]
 
     def moments(self) -> Iterator[Moment]:
-        """What was seen at moments that are spread evenly; those whose picture cannot be read are passed over."""
+        """The views at evenly spread times; those whose picture cannot be read are left out."""
         way = self.main
         count = len(way.stamps_ns)
         for k in np.unique(np.linspace(0, count - 1, min(count, MOST_MOMENTS)).round().astype(int)).tolist():
@@ -89,7 +90,7 @@ class RunScene:
 
 
 def scene_of(story: RunSummary, album: Album) -> RunScene:
-    """The scene of a run; ValueError where neither odometry nor truth tells where the camera was."""
+    """The scene of a run; ValueError where neither odometry nor truth gives the camera's pose."""
     ways = _ways(story)
     if not ways:
         raise ValueError(f"{story.name}: expected odometry or a ground truth to show where the camera was, got neither")
@@ -117,7 +118,7 @@ def _true_way(story: RunSummary, stamps_ns: list[int]) -> dict[str, Way]:
 
 
 def _edges(story: RunSummary, way: Way) -> tuple[Edge, ...]:
-    """The closures whose two moments are both on the way, at the nearest of its poses."""
+    """The closures with both stamps on the trajectory, at the nearest of its poses."""
     stamps, places = np.array(way.stamps_ns), way.positions
     pruned = set(map(id, story.pruned))
     edges = []

@@ -33,7 +33,7 @@ class SceneFiles:
         return {option: file for option, file in files.items() if file is not None}
 
     def require_way(self, recording: Path, is_known: bool) -> None:
-        """ValueError, before the run, where nothing will tell where the camera was."""
+        """ValueError, before the run, where nothing will give the camera's pose."""
         if self.wanted and not is_known:
             raise ValueError(
                 f"{recording}: {', '.join(self.wanted)}: expected odometry or a ground truth to show where the camera "
@@ -41,7 +41,7 @@ class SceneFiles:
             )
 
     def write(self, scene: RunScene, tell: Callable[[str], object] = lambda line: None) -> None:
-        """Write what is asked for; ``tell`` receives what. OSError where a file cannot be written."""
+        """Write what is asked for; ``tell`` receives a line for each file. OSError where a file cannot be written."""
         if self.rerun is not None:
             tell(f"  {self.rerun}: {_said(scene, write_rerun(self.rerun, scene))}; open it with: rerun {self.rerun}")
         if self.mcap is not None:
@@ -50,4 +50,4 @@ class SceneFiles:
 
 def _said(scene: RunScene, moments: int) -> str:
     ways = ", ".join(scene.ways)
-    return f"the way ({ways}), {len(scene.edges)} closures, {moments} moments with picture and cloud"
+    return f"the trajectory ({ways}), {len(scene.edges)} closures, {moments} frames with picture and cloud"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run was made with, so that who reads its report can make it again."""
+"""What a run was made with, so that a reader of its report can repeat it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from xml.etree import ElementTree
 
 from objreg_ros import share
 
-DIGITS = 12  # of a commit and of a model's digest: enough to tell them apart
+DIGITS = 12  # of a commit and of a model's digest: enough to distinguish them
 PATIENCE_S = 5.0  # for git
 
 
 def about(recording: Path, model: str, params: Mapping[str, Any], arguments: Sequence[str]) -> dict[str, Any]:
     """Version, commit, command, date, recording, model and the parameters that are not the defaults, as JSON.
 
-    ``arguments`` are what stood behind `objreg`. OSError where there is no such model.
+    ``arguments`` are those of `objreg`. OSError where there is no such model.
     """
     file = share.model(model)
     return {
@@ -49,7 +49,7 @@ def commit(folder: Path | None) -> str | None:
         return None
     asked = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--exclude=*", f"--abbrev={DIGITS}"]
     try:
-        told = subprocess.run(asked, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
+        done = subprocess.run(asked, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
     except (OSError, subprocess.SubprocessError):
         return None
-    return told.stdout.strip() or None
+    return done.stdout.strip() or None

@@ -42,7 +42,7 @@ class CameraMap:
     """The largest part of a run that is in one frame: ``frames`` by time, of ``sessions`` many sessions.
 
     ``graph`` solved it. ``sessions_apart`` and ``frames_apart`` count what no closures tie to it. ``pruned`` closures
-    were not believed. ``unsolved`` is why nothing is corrected, empty where it is.
+    were rejected. ``unsolved`` is why nothing is corrected, empty where it is.
     """
 
     graph: PoseGraph = field(default_factory=PoseGraph)
@@ -75,12 +75,12 @@ class CameraMap:
 
 
 def of_one_clock(closures: Sequence[LoopClosure]) -> list[LoopClosure]:
-    """The closures from an earlier to a later moment: the others tie two runs of the clock; a map is of one."""
+    """The closures from an earlier to a later stamp: the others tie two runs of the clock; a map is of one."""
     return [closure for closure in closures if closure.from_ns < closure.to_ns]
 
 
 def with_sessions(closures: Sequence[LoopClosure], frames: Sequence[TrackedFrame]) -> tuple[LoopClosure, ...]:
-    """The closures with the names of the sessions that their moments are of, by frames whose stamps increase."""
+    """The closures with the sessions of their keyframes, by frames whose stamps increase."""
     stamps = [frame.stamp_ns for frame in frames]
 
     def session_at(stamp_ns: int) -> int | None:
@@ -101,7 +101,7 @@ def _by_session(frames: Sequence[TrackedFrame]) -> dict[int, list[TrackedFrame]]
 
 
 def _reached(anchor: int, rest: set[int], closures: Sequence[LoopClosure]) -> set[int]:
-    """The sessions of ``rest`` to which closures lead from one of them, whether or not they will be believed."""
+    """The sessions of ``rest`` to which closures lead from one of them, whether or not the graph keeps them."""
     pairs = {(closure.from_session, closure.to_session) for closure in closures}
     reached, grown = set[int](), {anchor}
     while grown:

@@ -90,7 +90,7 @@ def thinned(seen: DepthImage) -> tuple[Array, Array]:
 
 
 def _lacking(seen: DepthImage | None, why: str) -> str:
-    """Why a moment has no cloud; empty where it has one."""
+    """Why a keyframe has no cloud; empty where it has one."""
     if seen is None:
         return why
     return "" if (seen.depth > 0).any() else "no depth was measured"

@@ -15,7 +15,7 @@ from objreg_ros.report.run.sections import View, judged, spaced
 from objreg_ros.report.run.trajectory_error import root_mean_square
 
 DEFAULT = "default"
-KEYFRAME_NS = round(RegistrarParams().keyframe_seconds * 1e9)  # moments so near are of one keyframe
+KEYFRAME_NS = round(RegistrarParams().keyframe_seconds * 1e9)  # stamps so near are of one keyframe
 
 
 def comparison(stories: Sequence[RunSummary]) -> View:
@@ -29,22 +29,22 @@ def comparison(stories: Sequence[RunSummary]) -> View:
 
 def names_of(stories: Sequence[RunSummary]) -> list[str]:
     """A letter for each run, and what differs from the others: parameters, model, version, recording."""
-    told = [_flat(story) for story in stories]
-    keys = dict.fromkeys(key for made in told for key in made)
-    differing = [key for key in keys if len({str(made.get(key, DEFAULT)) for made in told}) > 1]
+    flats = [_flat(story) for story in stories]
+    keys = dict.fromkeys(key for made in flats for key in made)
+    differing = [key for key in keys if len({str(made.get(key, DEFAULT)) for made in flats}) > 1]
     names = []
-    for k, made in enumerate(told):
-        words = ", ".join(f"{key} {made.get(key, DEFAULT)}" for key in differing)
+    for k, made in enumerate(flats):
+        text = ", ".join(f"{key} {made.get(key, DEFAULT)}" for key in differing)
         letter = ascii_uppercase[k] if k < len(ascii_uppercase) else str(k + 1)
-        names.append(f"{letter}: {words}" if words else f"{letter}: {stories[k].name}, made as the others")
+        names.append(f"{letter}: {text}" if text else f"{letter}: {stories[k].name}, made as the others")
     return names
 
 
 def _flat(story: RunSummary) -> dict[str, Any]:
-    """What a run was made with, by one name each; without what differs always."""
+    """What a run was made with, by name; without what always differs."""
     about: Mapping[str, Any] = story.summary.get("about", {})
     model = about.get("model") or {}
-    told = {
+    made = {
         **about.get("params", {}),
         "model": f"{model.get('name')} {model.get('sha256')}" if model else None,
         "version": about.get("version"),
@@ -52,8 +52,8 @@ def _flat(story: RunSummary) -> dict[str, Any]:
         "recording": story.name,
         "odometry": story.summary.get("odometry"),
     }
-    told.pop("detector.model", None)
-    return {key: value for key, value in told.items() if value is not None}
+    made.pop("detector.model", None)
+    return {key: value for key, value in made.items() if value is not None}
 
 
 def _table(stories: Sequence[RunSummary]) -> list[tuple[str, list[str]]]:
@@ -105,13 +105,13 @@ def _change(stories: Sequence[RunSummary], k: int, names: Sequence[str]) -> View
     return {
         "title": f"{names[k].split(':')[0]} against {names[0].split(':')[0]}",
         "kept": len(kept),
-        "gained": [_told(pair, k, before) for pair in gained],
-        "lost": [_told(pair, 0, after) for pair in lost],
+        "gained": [_changed(pair, k, before) for pair in gained],
+        "lost": [_changed(pair, 0, after) for pair in lost],
     }
 
 
 def matched(before: Sequence[LoopClosure], after: Sequence[LoopClosure]) -> dict[int, int]:
-    """Which closure of one run is which of another: both moments within `KEYFRAME_NS`, the nearest first."""
+    """Which closure of one run is which of another: both stamps within `KEYFRAME_NS`, the nearest first."""
     near = sorted(
         (apart, i, j)
         for i, one in enumerate(before)
@@ -131,7 +131,7 @@ def _apart_ns(one: LoopClosure, other: LoopClosure | Rejected) -> int:
     return max(abs(one.from_ns - other.from_ns), abs(one.to_ns - other.to_ns))
 
 
-def _told(pair: Pair, run: int, other: RunSummary) -> View:
+def _changed(pair: Pair, run: int, other: RunSummary) -> View:
     """A closure that only one run has, and what became of it in the other."""
     error = "" if pair.error is None else f"{pair.error[0]:.1f}° and {pair.error[1]:.1f} cm"
     times = f"{pair.seconds[0]:.1f} s ↔ {pair.seconds[1]:.1f} s"
@@ -141,11 +141,11 @@ def _told(pair: Pair, run: int, other: RunSummary) -> View:
 
 
 def _instead(pair: Pair, other: RunSummary) -> str:
-    """Why the other run refused the same moments; that it did not try them where it did not."""
+    """Why the other run refused the same pair; ``not tried`` where it did not try it."""
     if not isinstance(pair.told, LoopClosure):
         return ""
-    told = [(apart, refusal) for refusal in other.refusals if (apart := _apart_ns(pair.told, refusal)) <= KEYFRAME_NS]
-    if not told:
+    near = [(apart, refusal) for refusal in other.refusals if (apart := _apart_ns(pair.told, refusal)) <= KEYFRAME_NS]
+    if not near:
         return "not tried"
-    refusal = min(told, key=lambda item: item[0])[1]
+    refusal = min(near, key=lambda item: item[0])[1]
     return f"{spaced(refusal.reason.value)}: {refusal.detail}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of a report: the way, its error over time, the timeline, the object map."""
+"""The figures of a report: the trajectory, its error over time, the timeline, the object map."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HEAP_SIGHTINGS = 4  # of one label there, at least
 
 
 class Ground:
-    """The plane in which a way is drawn: the two directions in which it extends the most."""
+    """The plane in which a trajectory is drawn: the two directions in which it extends the most."""
 
     def __init__(self, xyz: Array) -> None:
         self.middle = xyz.mean(axis=0)
@@ -36,7 +36,7 @@ class Ground:
 
 
 def way(story: RunSummary, stamps_ns: Array, lines: Mapping[str, Array], width: int = WIDE) -> str:
-    """Ways (N, 3) by their CSS class from above, at stamps (N,), and the closures as links on the last of them."""
+    """Trajectories (N, 3) by CSS class from above, at stamps (N,), and the closures as links on the last of them."""
     ground = Ground(next(iter(lines.values())) if "true" in lines else list(lines.values())[-1])
     flat = {name: ground.flat(xyz) for name, xyz in lines.items()}
     plot = Plot.equal(np.concatenate(list(flat.values())), width)
@@ -52,7 +52,7 @@ def way(story: RunSummary, stamps_ns: Array, lines: Mapping[str, Array], width: 
     x, y = main[0]
     plot.dot(x, y, "start", "start", radius=4)
     plot.text(plot.x(x) + 8, plot.y(y) - 6, "start")
-    return plot.svg("the way of the camera from above: " + ", ".join(lines))
+    return plot.svg("the camera trajectory from above: " + ", ".join(lines))
 
 
 def error_over_time(story: RunSummary, tracks: Tracks, width: int = WIDE) -> str:
@@ -82,7 +82,7 @@ def timeline(story: RunSummary, width: int = WIDE) -> str:
     heights = {name: 3 * LANE if name == "closures" else LANE for name in rows}
     level = dict(zip(rows, np.cumsum(list(heights.values())) - LANE / 2, strict=True))
     total = sum(heights.values())
-    end = max((story.seconds(moment) for moment in _moments(story)), default=1.0)
+    end = max((story.seconds(stamp_ns) for stamp_ns in _stamps_ns(story)), default=1.0)
     plot = Plot((0.0, end + 1e-9), (-float(total), 0.0), width, height=total + 46, left=150)
     plot.x_axis("s")
     for name in rows:
@@ -93,13 +93,13 @@ def timeline(story: RunSummary, width: int = WIDE) -> str:
     for k, refusal in enumerate(story.refusals):
         if not story.in_time(refusal.to_ns):
             continue
-        words = f"{refusal.detail} ({story.seconds(refusal.from_ns):.1f} s, {story.seconds(refusal.to_ns):.1f} s)"
-        plot.dot(story.seconds(refusal.to_ns), -level[refusal.reason.value], "refused", words, pair=f"r{k}")
+        text = f"{refusal.detail} ({story.seconds(refusal.from_ns):.1f} s, {story.seconds(refusal.to_ns):.1f} s)"
+        plot.dot(story.seconds(refusal.to_ns), -level[refusal.reason.value], "refused", text, pair=f"r{k}")
     return plot.svg("detections, closures and refusals over time")
 
 
 def object_map(story: RunSummary, corrected: bool, width: int = HALF) -> str:
-    """Every sighting of an object from above, before or in the corrected map, and the camera's way."""
+    """Every sighting of an object from above, before or in the corrected map, and the camera's trajectory."""
     seen = story.objects()
     places = [row[2] for row in seen]
     tracks = story.tracks()
@@ -157,7 +157,7 @@ def verdict(story: RunSummary, closure: LoopClosure) -> str:
 
 
 def ends(closure: LoopClosure, stamps_ns: Array, way: Array) -> Array:
-    """Where both moments of a closure are on a way (N, D) at stamps (N,): (2, D)."""
+    """Where both keyframes of a closure are on a trajectory (N, D) at stamps (N,): (2, D)."""
     return np.array([way[np.abs(stamps_ns - stamp).argmin()] for stamp in (closure.from_ns, closure.to_ns)])
 
 
@@ -170,10 +170,10 @@ def closure_words(story: RunSummary, closure: LoopClosure) -> str:
     return ", ".join([times, *closure.labels, *moved, *truth])
 
 
-def _moments(story: RunSummary) -> list[int]:
-    moments = [glimpse.stamp_ns for glimpse in story.glimpses]
-    moments += [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
-    return [moment for moment in moments if story.in_time(moment)]
+def _stamps_ns(story: RunSummary) -> list[int]:
+    stamps_ns = [glimpse.stamp_ns for glimpse in story.glimpses]
+    stamps_ns += [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
+    return [stamp_ns for stamp_ns in stamps_ns if story.in_time(stamp_ns)]
 
 
 def _draw_detections(plot: Plot, story: RunSummary, level: dict[str, float]) -> None:
@@ -196,5 +196,5 @@ def _draw_closures(plot: Plot, story: RunSummary, row: float) -> None:
         rise = 2.4 * LANE * min(abs(closure.to_ns - closure.from_ns) / longest, 1.0)
         style = verdict(story, closure)
         plot.arc(start, end, -row, rise, style, closure_words(story, closure), f"c{k}")
-        for moment in (start, end):
-            plot.dot(moment, -row, style, closure_words(story, closure), 2.5, f"c{k}")
+        for seconds in (start, end):
+            plot.dot(seconds, -row, style, closure_words(story, closure), 2.5, f"c{k}")

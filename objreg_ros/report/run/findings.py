@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a run stopped short of a closed loop, why it is likely so, and what to do next.
 
-Everything is read off the JSON of a run, that of `objreg offline` or of `objreg demo`; what was found of its recording
-comes beside it.
+Everything is read from the JSON of a run, that of `objreg offline` or of `objreg demo`. The findings on its recording
+come beside it.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ LATE_MS, LATE_SIGMAS = 45.0, 4.0  # cameras whose two pictures are taken in turn
 OVERTAKEN = "overtaken"
 PASSED_OVER = tuple(reason.value for reason in (Reason.OVER_BUDGET, Reason.CLOCK, Reason.UNREADABLE))
 LOOK = "objreg inspect {recording}"
-FETCH = "get a model of real things with `objreg fetch-model`, then run again"
+FETCH = "get a model of real objects with `objreg fetch-model`, then run again"
 SIMULATED_TOPICS = ("/image", "/image/compressed")
 SIMULATED_TRUTH = "truth/frames.jsonl"  # what `objreg simulate` writes beside
 
 
 def setting(recording: Recording, inputs: Inputs, model: str) -> dict[str, Any]:
-    """What a run's JSON tells of it for `find`: the file of the model, and whether the recording is simulated.
+    """What `find` takes from a run's JSON: the file of the model, and whether the recording is simulated.
 
-    That is None where it could be either: a recording with the topics of the simulator, but without its truth beside.
-    Of a folder of pictures it says that too, for there is no other topic to take.
+    That is None where it could be either: a recording with the topics of the simulator, but without its truth.
+    For a folder of pictures the result has ``pictures`` too, since there is no other topic to take.
     """
-    told = {"model": share.model(model).name, "simulated": _is_simulated(recording, inputs)}
-    return {**told, "pictures": True} if recording.of_pictures else told
+    made = {"model": share.model(model).name, "simulated": _is_simulated(recording, inputs)}
+    return {**made, "pictures": True} if recording.of_pictures else made
 
 
 def _is_simulated(recording: Recording, inputs: Inputs) -> bool | None:
@@ -61,7 +61,7 @@ class Counts:
 
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Counts:
-        """The counts of a run's JSON; what the live graph's does not tell is counted from its frames."""
+        """The counts of a run's JSON; what the live graph's JSON lacks is counted from its frames."""
         nodes, glimpses = summary.get("nodes", {}), summary.get("glimpses", ())
         dropped = Counter(summary.get("dropped", {}))
         for counters in nodes.values():
@@ -79,9 +79,9 @@ class Counts:
 
 
 def find(summary: Mapping[str, Any], of_recording: Iterable[Finding] = ()) -> tuple[Finding, ...]:
-    """Where the run stopped first, if no loop was closed; then what else it and its recording were found to have.
+    """Where the run stopped first, if no loop was closed; then all other findings on it and its recording.
 
-    What was measured of its stream to be other than it says is the cause before all others.
+    A stream that was measured to differ from what it states comes first among the causes.
     """
     counts, causes = Counts.of(summary), tuple(Finding(**row) for row in summary.get("stream", ()))
     steps = (_no_frame, _no_detections, _no_objects)
@@ -100,21 +100,21 @@ def find(summary: Mapping[str, Any], of_recording: Iterable[Finding] = ()) -> tu
 
 
 def _late_depth(summary: Mapping[str, Any]) -> Finding | None:
-    """Depth that goes by its stamp with colour, and shows another moment."""
+    """Depth that matches colour by its stamp, but was captured at another time."""
     lag = summary.get("depth_lag")
     if lag is None or abs(lag["ms"]) < max(LATE_MS, LATE_SIGMAS * lag["sigma_ms"]):
         return None
     by, side = f"{abs(lag['ms']):.0f} ± {lag['sigma_ms']:.0f} ms", "before" if lag["ms"] > 0 else "after"
     return Finding(
-        f"depth shows what was {by} {side} the picture of its stamp",
-        "the stamps of colour and of depth are of two moments; as the camera turns, depth lies beside its picture",
-        "mend the stamps in the driver (its time offset), or let the camera take both at once",
+        f"depth was captured {by} {side} the picture of its stamp",
+        "the stamps of colour and depth are of different times; as the camera turns, depth lies beside its picture",
+        "correct the stamps in the driver (its time offset), or let the camera take both at once",
         "streams-apart",
     )
 
 
 def found_in(run: Run) -> tuple[Finding, ...]:
-    """What a run found of its stream; where it came to no frame, why."""
+    """What a run measured of its stream; why it has no frame, where it has none."""
     summary = {"frames": run.frames, "dropped": run.dropped, "complaints": run.complaints}
     stopped = _no_frame(Counts.of(summary), summary)
     return run.findings if stopped is None else (stopped,)
@@ -140,7 +140,7 @@ def _no_frame(counts: Counts, summary: Mapping[str, Any]) -> Finding | None:
     malformed = {reason: n for reason, n in counts.dropped.items() if reason.startswith("malformed_")}
     if malformed:
         said = summary.get("complaints", {}).get(max(malformed, key=lambda reason: malformed[reason]), "")
-        cause = "the messages are not what their topics say" + (f" ({said})" if said else "")
+        cause = "the messages do not match what their topics state" + (f" ({said})" if said else "")
         other = "repair or replace these files" if summary.get("pictures") else "take others with --remap"
         return Finding(what, cause, f"see which with `{_look(summary)}`, and {other}", anchor)
     if counts.dropped:
@@ -189,9 +189,9 @@ def _none_tried(counts: Counts, summary: Mapping[str, Any]) -> Finding | None:
     most = max(passed_over, key=lambda reason: passed_over[reason])
     if most == Reason.OVER_BUDGET.value:
         return _over_budget(summary)
-    words = REFUSALS[most]
-    what = f"{passed_over[most]} candidates were not tried: {words.meaning}"
-    return Finding(what, todo=words.remedy.removesuffix("."), anchor=most)
+    entry = REFUSALS[most]
+    what = f"{passed_over[most]} candidates were not tried: {entry.meaning}"
+    return Finding(what, todo=entry.remedy.removesuffix("."), anchor=most)
 
 
 def _no_revisit(counts: Counts, summary: Mapping[str, Any]) -> Finding | None:
@@ -229,14 +229,14 @@ def _simulated_model(counts: Counts, summary: Mapping[str, Any]) -> Finding | No
 
 def _overtaken(summary: Mapping[str, Any]) -> Finding | None:
     late = {
-        room: f"{counters['dropped'][OVERTAKEN]} of {counters['received']}"
-        for room, counters in summary.get("nodes", {}).items()
+        node: f"{counters['dropped'][OVERTAKEN]} of {counters['received']}"
+        for node, counters in summary.get("nodes", {}).items()
         if counters.get("dropped", {}).get(OVERTAKEN, 0) > MANY * counters.get("received", 0)
     }
     if not late:
         return None
     return Finding(
-        "frames were overtaken by newer ones: " + ", ".join(f"{room} {count}" for room, count in late.items()),
+        "frames were overtaken by newer ones: " + ", ".join(f"{node} {count}" for node, count in late.items()),
         "this machine is slower than the camera; that costs frames, and no closure is wrong for it",
         "play slower (--rate 0.5) or wait for every frame (--lossless); on a robot raise detector.threads and "
         "registrar.threads, or bound the search with registrar.search_seconds",

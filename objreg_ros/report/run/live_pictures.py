@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two pictures of a live run: what the graph saw in one frame, and the way with its closures."""
+"""Two pictures of a live run: what the graph detected in one frame, and the trajectory with its closures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from objreg_ros.data import Array, Detections, Intrinsics, LoopClosure, ObjectCl
 from objreg_ros.truth import FALSE, Truth, within
 from objreg_ros.whole_file import whole_file, write_whole
 
-GOLDEN_ANGLE = 137.508  # degrees of hue between one object and the next: neighbours never look alike
+GOLDEN_ANGLE = 137.508  # degrees of hue between one object and the next: neighbours always differ
 FONT, FONT_SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
 RIGHT, WRONG, WAY = "#1a8a3c", "#d03b3b", "#8b8a83"
 
@@ -67,24 +67,26 @@ def _draw_box(picture: Array, xyxy: Array, name: str) -> None:
 
 
 def draw_way(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
-    """Write the camera's way from above with its closures, green where they are true and red where they are false.
+    """Write the camera's trajectory from above with its closures, the true ones green and the false ones red.
 
-    The plane is that of the two directions in which the way extends most. ValueError where the truth has no poses,
-    ModuleNotFoundError where there is no matplotlib.
+    The plane is that of the two directions in which the trajectory extends most. ValueError where the truth has no
+    poses, ModuleNotFoundError where there is no matplotlib.
     """
     if not truth.poses:
         raise ValueError("expected a recording with ground truth to draw its path")
     try:
         from matplotlib.figure import Figure
     except ModuleNotFoundError as absent:
-        told = "expected matplotlib to draw the way, found none; pip install 'objreg_ros[simulation]' brings it"
-        raise ModuleNotFoundError(told, name="matplotlib") from absent
+        lacking = (
+            "expected matplotlib to draw the trajectory, found none; pip install 'objreg_ros[simulation]' brings it"
+        )
+        raise ModuleNotFoundError(lacking, name="matplotlib") from absent
 
     positions = np.array([T[:3, 3] for T in truth.poses])
     axes = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)[2][:2]
     figure = Figure(figsize=(8, 6), layout="constrained")
     plot = figure.add_subplot(aspect="equal", xlabel="m", ylabel="m")
-    plot.plot(*(axes @ (positions - positions.mean(axis=0)).T), color=WAY, linewidth=1.5, label="way of the camera")
+    plot.plot(*(axes @ (positions - positions.mean(axis=0)).T), color=WAY, linewidth=1.5, label="camera trajectory")
     for closure in closures:
         _draw_closure(plot, truth, closure, axes, positions.mean(axis=0))
     plot.set_title(f"{len(closures)} constraints, green where true, red where false")

@@ -13,7 +13,7 @@ from objreg_ros.data import Array, Intrinsics
 from objreg_ros.recording.messages import header_stamp_ns
 from objreg_ros.recording.record import Record, Recording
 
-SLOP_NS = 50_000_000  # how far from a moment the stamp of its message may be
+SLOP_NS = 50_000_000  # how far from a time the stamp of its message may be
 WINDOW_NS = 150_000_000  # how far from its stamp a message is looked for before all of its topic are read
 
 
@@ -32,7 +32,7 @@ class MessagesByStamp:
         return len(self._unreadable)
 
     def nearest(self, stamp_ns: int) -> Any | None:
-        """The message with the stamp nearest to a moment; None where none is within `SLOP_NS`.
+        """The message with the stamp nearest to a time; None where none is within `SLOP_NS`.
 
         ValueError or OSError where it is broken.
         """
@@ -46,8 +46,8 @@ class MessagesByStamp:
     def _indexed(self, stamp_ns: int) -> dict[int, Record]:
         """The records with the stamp that is nearest of all."""
         if self._index is None:
-            told = sorted((stamp, record.stamp_ns) for stamp, record in self._stamped())
-            self._index = np.array(told, np.int64).reshape(-1, 2)
+            stamps = sorted((stamp, record.stamp_ns) for stamp, record in self._stamped())
+            self._index = np.array(stamps, np.int64).reshape(-1, 2)
         if len(self._index) == 0:
             return {}
         recorded_ns = int(self._index[np.abs(self._index[:, 0] - stamp_ns).argmin(), 1])
@@ -78,23 +78,23 @@ def _nearest(stamps_ns: Iterable[int], stamp_ns: int) -> int | None:
 
 
 class Cameras:
-    """The calibrated camera_infos of a topic, without those that say what the one before them says."""
+    """The calibrated camera_infos of a topic, without those that repeat the one before them."""
 
     def __init__(self, recording: Recording, topic: str | None) -> None:
-        self._told: list[tuple[int, Any]] = []
+        self._infos: list[tuple[int, Any]] = []
         last: Intrinsics | None = None
         for message in _readable(recording, topic) if topic else ():
             camera = _calibrated(message)
             if camera is not None and camera != last:
-                self._told.append((from_msg.stamp_ns(message), message))
+                self._infos.append((from_msg.stamp_ns(message), message))
                 last = camera
 
     def at(self, stamp_ns: int) -> Any | None:
-        """The newest camera_info of a moment or before, else the first; None where none is calibrated."""
-        before = [(stamp, k) for k, (stamp, _) in enumerate(self._told) if stamp <= stamp_ns]
+        """The newest camera_info at a time or before it, else the first; None where none is calibrated."""
+        before = [(stamp, k) for k, (stamp, _) in enumerate(self._infos) if stamp <= stamp_ns]
         if before:
-            return self._told[max(before)[1]][1]
-        return self._told[0][1] if self._told else None
+            return self._infos[max(before)[1]][1]
+        return self._infos[0][1] if self._infos else None
 
 
 def _readable(recording: Recording, topic: str) -> Iterator[Any]:

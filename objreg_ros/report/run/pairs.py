@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every pair of moments that a run accepted or refused, as a row that one can look up."""
+"""Every pair of keyframes that a run accepted or refused, as a row of a table."""
 
 from __future__ import annotations
 
@@ -44,24 +44,24 @@ class Pair:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What closed it, each once; of a refusal what was detected at both moments."""
+        """What closed it, each once; of a refusal what was detected in both frames."""
         if isinstance(self.told, LoopClosure):
             return tuple(dict.fromkeys(self.told.labels))
         return self.story.seen_at_both(self.told.from_ns, self.told.to_ns)
 
     @property
     def seconds(self) -> tuple[float, float]:
-        """Both moments since the run began."""
+        """Both times since the run began, s."""
         return self.story.seconds(self.told.from_ns), self.story.seconds(self.told.to_ns)
 
     @cached_property
     def error(self) -> Error | None:
-        """Degrees and centimetres by which the pose is wrong; None where truth does not tell or there is no pose."""
+        """Degrees and centimetres by which the pose is wrong; None without truth or without a pose."""
         return self.story.truth.error(self.told)
 
     @property
     def words(self) -> str:
-        """The numbers behind a refusal, what moved, and what truth says."""
+        """The numbers behind a refusal, what moved, and the true error."""
         if isinstance(self.told, Rejected):
             parts = [self.told.detail]
         else:
@@ -70,7 +70,7 @@ class Pair:
 
     @property
     def _in_truth(self) -> str:
-        """How far the two moments are apart, and by how much the pose is wrong; empty without truth."""
+        """How far the two cameras are apart, and by how much the pose is wrong; empty without truth."""
         truth = self.story.truth.between(self.told.from_ns, self.told.to_ns)
         if truth is None or self.told.from_ns == self.told.to_ns:
             return ""
@@ -82,11 +82,11 @@ class Pair:
 
 def pairs_of(story: RunSummary) -> list[Pair]:
     """All constraints (keys c0, c1, …) and then all refusals (r0, r1, …) of a run, in the order of its JSON."""
-    told: Iterable[tuple[str, LoopClosure | Rejected]] = (
+    items: Iterable[tuple[str, LoopClosure | Rejected]] = (
         *((f"c{k}", closure) for k, closure in enumerate(story.closures)),
         *((f"r{k}", refusal) for k, refusal in enumerate(story.refusals)),
     )
-    return [Pair(key, item, story) for key, item in told]
+    return [Pair(key, item, story) for key, item in items]
 
 
 def by_interest(pairs: Iterable[Pair]) -> list[Pair]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of registrations: what the two moments saw, and the one laid over the other."""
+"""Pictures of registrations: the two camera pictures, and one laid over the other."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from objreg_ros.segmenter.sensor.organise import organise
 
 WIDTH = 320  # px of one picture
 QUALITY = 82
-KEPT = 64  # moments that an album holds at once: 2 MB each of VGA
+KEPT = 64  # images that an album holds at once: 2 MB each of VGA
 
 
 class Album:
-    """The colour and depth of a recording at any moment, by the stamps of the messages.
+    """The colour and depth of a recording at any time, by the stamps of the messages.
 
-    Pictures of a lens are rectified, unless they are so already: ``rectified`` is the segmenter's parameter.
+    Pictures with lens distortion are rectified, unless ``rectified``, the segmenter's parameter, says they are already.
     """
 
     def __init__(self, recording: Recording, inputs: Inputs, rectified: str = "auto") -> None:
@@ -46,17 +46,17 @@ class Album:
         self._known: dict[int, DepthImage | str] = {}
 
     def at(self, stamp_ns: int) -> DepthImage | None:
-        """The depth image with colour at a moment; None where there is none or it cannot be read, see `lacking`."""
+        """The depth image with colour at a time; None where there is none or it cannot be read, see `lacking`."""
         seen = self._seen(stamp_ns)
         return None if isinstance(seen, str) else seen
 
     def lacking(self, stamp_ns: int) -> str:
-        """Why there is no picture of a moment, in words; empty where there is one."""
+        """Why there is no picture at a time, as text; empty where there is one."""
         seen = self._seen(stamp_ns)
         return seen if isinstance(seen, str) else ""
 
     def rectified(self, detections: Detections) -> Detections:
-        """Boxes of the recorded picture of a moment, in the picture that `at` gives."""
+        """Boxes of the recorded picture at a time, in the picture that `at` gives."""
         self._seen(detections.stamp_ns)
         own = self._cameras.at(detections.stamp_ns), self._raw
         return lenses.detections(detections, *(self._of_picture or own))
@@ -75,7 +75,7 @@ class Album:
         try:
             depth = self._source.nearest(stamp_ns)
             if depth is None:
-                return _nothing_near(self._source, "the moment")
+                return _nothing_near(self._source, "the stamp")
             colour = None if self._image is None else self._image.nearest(from_msg.stamp_ns(depth))
             seen = self._depth_image(depth, colour)
         except (ValueError, OSError) as error:
@@ -128,7 +128,7 @@ def chosen_closures(story: RunSummary, most: int = 6) -> list[LoopClosure]:
 
 
 def chosen_refusals(story: RunSummary, most: int = 6) -> list[Rejected]:
-    """Refusals of something that was tried, as many kinds as there are."""
+    """Refusals of candidates that were tried, as many kinds as there are."""
     tried = [refusal for refusal in story.refusals if refusal.reason not in UNTRIED]
     by_reason = [[r for r in tried if r.reason is reason] for reason in dict.fromkeys(r.reason for r in tried)]
     share = -(-most // max(1, len(by_reason)))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What each reason of a refusal or a drop means, what to do, and which parameter or limit stands behind it.
 
-The report, the terminal and docs/troubleshooting.md have their words from here.
+The report, the terminal and docs/troubleshooting.md take their texts from here.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ class Words(NamedTuple):
 REFUSALS = {
     "no_candidate": Words(
         "no stored place has such objects",
-        "Nothing is wrong on the first pass. On a revisit, see whether the detector calls the objects alike both "
-        "times: put labels that it confuses into one group. With odometry, what it puts too far away "
-        "is not tried: tell its drift.",
+        "Nothing is wrong on the first pass. On a revisit, check that the detector gives the objects the same label "
+        "both times. Put labels that it confuses into one group. With odometry, places that it puts too far away "
+        "are not tried: set its drift.",
         ("registrar.label_groups", "registrar.odometry_radius", "registrar.odometry_drift", "registrar.min_gap"),
     ),
     "no_hypothesis": Words(
-        "no pose explains the two moments",
+        "no pose explains the two keyframes",
         "Too few points were seen, or no proposer found a pose. Look at more of the room, and trust depth farther "
         "where the sensor allows it.",
         ("segmenter.z_max", "registrar.context_range"),
@@ -54,8 +54,8 @@ REFUSALS = {
     ),
     "free_space_violated": Words(
         "something would float where the other view saw free space",
-        "The pose is false, or depth is. If all are refused so, check that depth is registered to colour, that both "
-        "have the same time, and the scale of depth.",
+        "The pose is false, or depth is. If all are refused for this, check that depth is registered to colour, that "
+        "both have the same time, and the scale of depth.",
         ("segmenter.slop", "segmenter.rectified", "segmenter.camera", "registrar.least_odds"),
         ((f"{GATE}/free_space.py", "LIMITS"),),
     ),
@@ -76,14 +76,14 @@ REFUSALS = {
     "chains_disagree": Words(
         "another pose is as good, or too little independent evidence agrees",
         "A lone or symmetric object fits in more than one way. See a second object in the same view, or come closer to "
-        "the side that tells front from back.",
+        "the side that distinguishes front from back.",
         ("registrar.least_odds", "registrar.confirm_seconds"),
         ((f"{GATE}/competing.py", "LEAST_MARGIN"),),
     ),
     "gravity_not_kept": Words(
         "the room would tilt",
-        "The pose is false, or gravity is. If many are refused so, say how the camera is turned and how the IMU is "
-        "mounted.",
+        "The pose is false, or gravity is. If many are refused for this, set how the camera is turned and how the IMU "
+        "is mounted.",
         ("segmenter.roll", "segmenter.up_tilt", "segmenter.T_camera_imu", "segmenter.level_odom"),
         ((f"{GATE}/gravity.py", "SIGMAS"),),
     ),
@@ -95,8 +95,8 @@ REFUSALS = {
     ),
     "odometry_disagrees": Words(
         "odometry rules it out",
-        "If odometry is worse than it is said to be, raise its drift. Check where the camera sits on the body that "
-        "odometry is about.",
+        "If odometry is worse than its stated drift, raise the drift. Check where the camera sits on the body that "
+        "odometry describes.",
         (
             "registrar.odometry_drift",
             "registrar.odometry_rotation_drift",
@@ -138,26 +138,26 @@ REFUSALS = {
         ),
     ),
     "unreadable": Words(
-        "what the store holds of this place is damaged",
+        "the stored data of this place is damaged",
         "The other keyframes of the store go on. `objreg export STORE FOLDER` names what is damaged and saves the "
         "rest. Look for a full or failing disk.",
         ("registrar.store",),
     ),
     "neighbours_disagree": Words(
-        "the keyframes around it tell another pose",
-        "The pose is false, or odometry slipped there. If right ones are refused so, look at what odometry does "
-        "on the way between the keyframes.",
+        "the keyframes around it support another pose",
+        "The pose is false, or odometry slipped there. If right ones are refused for this, look at the odometry "
+        "between the keyframes.",
         ("registrar.confirm_seconds",),
         (("registrar/confirmation.py", "OPPOSED_SHARE"),),
     ),
     "camera_implausible": Words(
-        "the camera, or the scale of its depth, is not what the stream says",
-        "The detail says what was measured and what was said. Mend camera_info, or name the camera.",
+        "the camera, or the scale of its depth, differs from what the stream states",
+        "The detail gives the measured and the stated value. Correct camera_info, or set the camera.",
         ("segmenter.camera",),
         (("plausibility/offset.py", "SHARE"), ("plausibility/stream_monitor.py", "SIGMAS")),
     ),
     "clock_began_anew": Words(
-        "what was seen before then has stamps of now, and is left out",
+        "data from before the restart has stamps of the present, and is left out",
         "A bag was played again into the same store, or a simulation was started anew. Take another store, or put "
         "this one aside by `~/reset` (`allow_remote_reset`).",
         ("registrar.store",),
@@ -165,27 +165,27 @@ REFUSALS = {
 }
 """By the value of `Reason`."""
 
-MEANINGS = {name: words.meaning for name, words in REFUSALS.items()}
+MEANINGS = {name: text.meaning for name, text in REFUSALS.items()}
 
 DROPS = {
     "overtaken": Words(
         "a newer frame came before the node took this one",
-        "The node is slower than the stream. Some of it is no trouble. For all frames play slower or losslessly "
-        "(`objreg replay --rate 0.5`, `--lossless`); on a robot lower the rate or give more threads.",
+        "The node is slower than the stream. A few such frames do no harm. To keep all frames, play slower or "
+        "losslessly (`objreg replay --rate 0.5`, `--lossless`); on a robot lower the rate or give more threads.",
         ("detector.max_rate", "detector.threads", "registrar.threads"),
     ),
     "malformed": Words(
         "the message breaks its contract; the reason ends with the name of the input",
-        "The log says what was expected and what came. `objreg inspect` says it of a recording.",
+        "The log states what was expected and what came. `objreg inspect` reports it for a recording.",
         ("segmenter.rectified", "segmenter.camera", "detector.max_megapixels"),
     ),
     "bug": Words(
-        "computing raised what nobody expected; the reason ends with the name of the exception",
+        "the computation raised an unexpected exception; the reason ends with the name of the exception",
         "Please report it with the traceback in the log.",
     ),
     "refused": Words(
         "the frame cannot be computed or stored",
-        "The log says why. For a store look at the space and the rights of its folder.",
+        "The log states why. For a store, check the free space and the permissions of its folder.",
         ("registrar.store",),
     ),
     "unmatched": Words(
@@ -202,8 +202,7 @@ DROPS = {
     ),
     "late": Words(
         "one of its stream with a later stamp was there before it",
-        "The stream is out of order, or two publishers share its topic: see `ros2 topic info -v`. A few are no "
-        "trouble.",
+        "The stream is out of order, or two publishers share its topic: see `ros2 topic info -v`. A few do no harm.",
     ),
     "time_jump": Words(
         "time jumped back and left it in the future",
@@ -231,7 +230,7 @@ DROPS = {
     ),
     "same_camera": Words(
         "two cameras of a robot have one frame",
-        "Nobody could tell whose moment a constraint names. Give each camera of a robot a frame of its own.",
+        "A constraint would not identify the camera of its keyframe. Give each camera of a robot its own frame.",
     ),
     "two_clocks": Words(
         "a constraint ties two runs of one clock",
@@ -245,11 +244,11 @@ DROPS = {
     ),
     "retracted": Words("the constraint was withdrawn while it waited", "Nothing is wrong."),
     "odometry_gap": Words(
-        "one of the constraint's moments lies in a gap of the odometry",
+        "one of the constraint's keyframes lies in a gap of the odometry",
         "See why odometry was silent then, and whether its messages are lost.",
     ),
     "before_odometry": Words(
-        "the odometry begins after the constraint's first moment",
+        "the odometry begins after the constraint's first keyframe",
         "Start odometry before the registrar, or the mapper with `resume` and the same days as the store.",
         ("mapper.resume",),
     ),

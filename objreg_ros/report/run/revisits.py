@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which loops there were to close, by truth, and how many of them were.
 
-A moment is revisited when an earlier one, ``gap`` before it, truly saw the same surfaces: their overlap is the smaller
-share, of both ways, of measured points that the other view measured too. Its view change is the angle between it and
-the earlier moment that it overlaps most.
+A view is a revisit when an earlier one, ``gap`` before it, truly saw the same surfaces. Their overlap is the share of
+measured points that the other view measured too, the smaller of both directions. Its view change is the angle between
+it and the earlier view that it overlaps most.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DEPTH_TOLERANCE = 0.05  # m, and as much again for every 2 m of depth
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """What was seen at a moment, and from where in truth."""
+    """What was seen at one time, and from which true pose."""
 
     stamp_ns: int
     view: View
@@ -33,7 +33,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Revisit:
-    """A moment that saw again what an earlier one had seen."""
+    """A view that saw again what an earlier one had seen."""
 
     from_ns: int
     to_ns: int
@@ -42,12 +42,12 @@ class Revisit:
 
 
 def overlap(a: Seen, b: Seen) -> float:
-    """The share 0..1 of the points of one view that the other measured too, the smaller of both ways."""
+    """The share 0..1 of the points of one view that the other measured too, the smaller of both directions."""
     return min(_share(a, b), _share(b, a))
 
 
 def revisits(moments: Sequence[Seen], gap_ns: int, least: float = 0.25) -> list[Revisit]:
-    """Every moment (in time order) with an earlier one, at least ``gap_ns`` before, that it overlaps by ``least``."""
+    """Every view (in time order) with an earlier one, at least ``gap_ns`` before, that it overlaps by ``least``."""
     found = []
     for k, later in enumerate(moments):
         earlier = [m for m in moments[:k] if later.stamp_ns - m.stamp_ns >= gap_ns]
@@ -57,7 +57,7 @@ def revisits(moments: Sequence[Seen], gap_ns: int, least: float = 0.25) -> list[
 
 
 def revisit_of(later: Seen, earlier: Iterable[Seen], least: float = 0.25) -> Revisit | None:
-    """The revisit of that of the earlier moments which the later one overlaps most; None if none by ``least``."""
+    """The revisit of the earlier view that the later one overlaps most; None if none by ``least``."""
     best, partner = max(((overlap(m, later), m) for m in earlier), key=lambda item: item[0], default=(0.0, later))
     if best < least:
         return None

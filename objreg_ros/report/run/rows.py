@@ -31,7 +31,7 @@ class Glimpse:
     objects: tuple[tuple[str, Array], ...] = ()
 
     def pose(self, by_tracking: bool) -> tuple[int, Array] | None:
-        """The session and ``T_session_camera`` of our own tracking, or of odometry; None where that knows none."""
+        """The session and ``T_session_camera`` of our own tracking, or of odometry; None where there is none."""
         if by_tracking:
             return self.tracked
         return None if self.T_odom_camera is None else (0, self.T_odom_camera)
@@ -90,7 +90,7 @@ def _place(xyz: Any) -> Array:
 
 
 def _tried_pose(pose: Any) -> Array | None:
-    """A pose that was turned down (4, 4), which may not be rigid; None where there is none to look at."""
+    """A refused pose (4, 4), which may not be rigid; None where there is none."""
     if pose is None:
         return None
     T = np.array(pose, float)
@@ -111,7 +111,7 @@ def _rigid(pose: Any, stamp_ns: int) -> Array:
 
 
 def closure_of(row: Mapping[str, Any]) -> LoopClosure:
-    """A closure, without the sessions of its moments; ValueError where it is none."""
+    """A closure, without the sessions of its keyframes; ValueError where it is none."""
     return LoopClosure(
         from_ns=_stamp(row["from_ns"]),
         to_ns=_stamp(row["to_ns"]),

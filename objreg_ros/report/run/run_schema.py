@@ -65,17 +65,17 @@ def _is_node(value: Any) -> bool:
 
 
 def _is_about(value: Any) -> bool:
-    """Whether it is what `about` makes; what is missing or null is not told."""
+    """Whether it is what `about` makes; fields may be missing or null."""
     if not isinstance(value, dict):
         return False
     model, params = value.get("model"), value.get("params", {})
-    told = [value.get(key) for key in ("version", "commit", "command", "date", "recording")]
-    fits = all(text is None or isinstance(text, str) for text in told)
+    texts = [value.get(key) for key in ("version", "commit", "command", "date", "recording")]
+    fits = all(text is None or isinstance(text, str) for text in texts)
     return fits and (model is None or isinstance(model, dict)) and isinstance(params, dict)
 
 
 def _each(fits: Check) -> Check:
-    """Whether a value is an object with nothing but such values."""
+    """Whether a value is an object with such values only."""
     return lambda value: isinstance(value, dict) and all(map(fits, value.values()))
 
 

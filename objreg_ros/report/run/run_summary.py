@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a report tells of: the JSON of a run, mapped, beside the truth of its recording."""
+"""What a report shows: the JSON of a run, mapped, beside the truth of its recording."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PAUSE_NS = 3_600_000_000_000  # what is further from a run is not of it: one sta
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """The camera's way three times over, at ``stamps_ns``: positions (N, 3) m in one frame, the true ones or None.
+    """The camera's trajectory three times, at ``stamps_ns``: positions (N, 3) m in one frame, the true ones or None.
 
     ``odometry_error`` and ``corrected_error`` (N,) m are the distances from the truth, None without it.
     ``T_drawn_map`` (4, 4) lays the map over the truth: by it ``corrected`` is drawn.
@@ -42,9 +42,9 @@ class Tracks:
 
     @property
     def lines(self) -> dict[str, Array]:
-        """The ways that there are, by name, in the order in which they are drawn."""
-        told = {self.source: self.odometry, "corrected": self.corrected}
-        return told if self.true is None else {"true": self.true, **told}
+        """The trajectories that there are, by name, in the order in which they are drawn."""
+        lines = {self.source: self.odometry, "corrected": self.corrected}
+        return lines if self.true is None else {"true": self.true, **lines}
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class RunSummary:
 
     @classmethod
     def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> RunSummary:
-        """The story of a run's JSON; the map is made here. Keys that are missing leave their section out.
+        """The summary of a run's JSON; the map is made here. Keys that are missing leave their section out.
 
         ValueError for what `objreg offline --json` would not write.
         """
@@ -77,7 +77,7 @@ class RunSummary:
 
     @property
     def by_tracking(self) -> bool:
-        """Whether the way is that of our own tracking, and not of odometry."""
+        """Whether the trajectory is that of our own tracking, and not of odometry."""
         return bool(self.summary.get("odometry") == TRACKED)
 
     @property
@@ -87,31 +87,31 @@ class RunSummary:
 
     @property
     def source(self) -> str:
-        """What the way is of, as its line is named."""
+        """The source of the trajectory, which names its line."""
         return TRACKED if self.by_tracking else "odometry"
 
     @cached_property
     def stretch_ns(self) -> tuple[int, int]:
-        """The first and the last moment of the most frames that have no pause of `PAUSE_NS` between them.
+        """The first and the last stamp of the most frames that have no pause of `PAUSE_NS` between them.
 
         Without frames, of all closures. A camera that starts before its clock stamps its first frames with 0.
         """
-        moments = sorted(glimpse.stamp_ns for glimpse in self.glimpses)
-        if not moments:
+        stamps_ns = sorted(glimpse.stamp_ns for glimpse in self.glimpses)
+        if not stamps_ns:
             ends = [stamp for closure in self.closures for stamp in (closure.from_ns, closure.to_ns)]
             return min(ends, default=0), max(ends, default=0)
-        pauses = [k for k in range(1, len(moments)) if moments[k] - moments[k - 1] > PAUSE_NS]
-        parts = [moments[a:b] for a, b in pairwise([0, *pauses, len(moments)])]
+        pauses = [k for k in range(1, len(stamps_ns)) if stamps_ns[k] - stamps_ns[k - 1] > PAUSE_NS]
+        parts = [stamps_ns[a:b] for a, b in pairwise([0, *pauses, len(stamps_ns)])]
         longest = max(parts, key=len)
         return longest[0], longest[-1]
 
     @property
     def start_ns(self) -> int:
-        """The first moment of the run."""
+        """The first stamp of the run."""
         return self.stretch_ns[0]
 
     def in_time(self, stamp_ns: int) -> bool:
-        """Whether a moment is on the timeline: no more than `PAUSE_NS` from the run."""
+        """Whether a stamp is on the timeline: no more than `PAUSE_NS` from the run."""
         first_ns, last_ns = self.stretch_ns
         return first_ns - PAUSE_NS <= stamp_ns <= last_ns + PAUSE_NS
 
@@ -127,15 +127,15 @@ class RunSummary:
         return {what: count for what, count in counts.items() if count}
 
     def seconds(self, stamp_ns: int) -> float:
-        """The time since the first moment."""
+        """The time since the first stamp."""
         return (stamp_ns - self.start_ns) * 1e-9
 
     def error(self, closure: LoopClosure) -> Error | None:
-        """The true error of a closure (degrees, centimetres); None where truth does not tell."""
+        """The true error of a closure (degrees, centimetres); None where truth does not cover it."""
         return self.truth.error(closure)
 
     def is_false(self, closure: LoopClosure) -> bool:
-        """Whether truth says that a closure is wrong; False where it does not tell."""
+        """Whether a closure is wrong by truth; False where truth does not cover it."""
         error = self.error(closure)
         return error is not None and not within(error, FALSE)
 
@@ -144,15 +144,15 @@ class RunSummary:
         return {glimpse.stamp_ns: glimpse.labels for glimpse in self.glimpses}
 
     def seen_at_both(self, from_ns: int, to_ns: int) -> tuple[str, ...]:
-        """The labels that were detected in the frames of both moments, by name; none where one is no frame's."""
+        """The labels that were detected in both frames, by name; none where one stamp is no frame's."""
         first, second = (set(self._labels_at.get(stamp, ())) for stamp in (from_ns, to_ns))
         return tuple(sorted(first & second))
 
     @property
     def left_out(self) -> int:
         """How many frames with a pose are not on the map because time does not advance at them."""
-        told = sum(glimpse.pose(self.by_tracking) is not None for glimpse in self.glimpses)
-        return told - len(self.map.frames) - self.map.frames_apart
+        posed = sum(glimpse.pose(self.by_tracking) is not None for glimpse in self.glimpses)
+        return posed - len(self.map.frames) - self.map.frames_apart
 
     def poses_before_and_after(self) -> tuple[list[int], list[Array], list[Array]]:
         """The stamps of the frames on the map, and the pose of the camera (4, 4) at each, before and ``T_map_camera``.
@@ -166,11 +166,11 @@ class RunSummary:
 
     @property
     def has_way(self) -> bool:
-        """Whether there is a way to draw. Of our own tracking one frame is none."""
+        """Whether there is a trajectory to draw. One frame of our own tracking is none."""
         return len(self.map.frames) > self.by_tracking
 
     def tracks(self) -> Tracks | None:
-        """Odometry, or our own tracking, corrected and true way, over each other; None without any to draw."""
+        """Odometry, or our own tracking, corrected and true trajectory, over each other; None without any to draw."""
         stamps, odometry, corrected = self.poses_before_and_after()
         if not self.has_way:
             return None
@@ -194,7 +194,7 @@ class RunSummary:
         )
 
     def true_way(self) -> tuple[Array, Array] | None:
-        """The stamps of the frames that truth tells of and the true positions (N, 3) m there; None for fewer than two.
+        """The stamps of the frames that truth covers and the true positions (N, 3) m there; None for fewer than two.
 
         Without frames, all of the truth.
         """
@@ -229,7 +229,7 @@ class RunSummary:
         ]
 
     def trajectory(self) -> dict[str, Any] | None:
-        """The way as JSON: what it is of, how much is in one piece, its errors; None without a way.
+        """The trajectory as JSON: its source, how much is in one piece, its errors; None without a trajectory.
 
         ``error_cm`` is the root mean square of the absolute trajectory error, before and after closures correct it;
         None without truth.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ways, the closures and the objects of a run in space, for a drawing that one can turn about."""
+"""The trajectories, the closures and the objects of a run in 3D, for a drawing that a reader can turn."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from objreg_ros.report.packed import packed
 from objreg_ros.report.run import figures
 from objreg_ros.report.run.run_summary import RunSummary, Tracks
 
-MOST_POSES = 5000  # of one way
+MOST_POSES = 5000  # of one trajectory
 MOST_SIGHTINGS = 20_000  # of all objects
 NEAR_AXIS = np.cos(np.radians(30))  # of the mean up of a camera: a frame's axis so near is what is up
 NAMES = {"true": "truth", "tracked": "our own tracking"}
@@ -23,7 +23,7 @@ APART_M = 0.4  # names nearer than this would cover each other
 
 
 def scene(story: RunSummary, stamps_ns: Array, lines: Mapping[str, Array], tracks: Tracks | None) -> dict[str, Any]:
-    """Ways (N, 3) by name, the closures on the last of them, and objects of the map: packed points, z is up."""
+    """Trajectories (N, 3) by name, the closures on the last of them, and objects of the map: packed points, z is up."""
     T_level_drawn = _levelling(story, stamps_ns, tracks)
     flat = {name: transform(T_level_drawn, xyz) for name, xyz in lines.items()}
     step = -(-len(stamps_ns) // MOST_POSES)
@@ -54,9 +54,9 @@ def _levelling(story: RunSummary, stamps_ns: Array, tracks: Tracks | None) -> Ar
 
 
 def levelling(poses: Array) -> Array:
-    """The rotation (4, 4) by which what is up for cameras at poses (N, 4, 4), on the mean, becomes z.
+    """The rotation (4, 4) that turns the mean up direction of cameras at poses (N, 4, 4) to z.
 
-    An axis of their frame is what is up where it is near. Where cameras have no up in common, nothing is turned.
+    An axis of their frame is taken as up where it is near. Where cameras have no up in common, nothing is turned.
     """
     mean = -poses[:, :3, 1].mean(axis=0)
     length = np.linalg.norm(mean)
@@ -72,7 +72,7 @@ def levelling(poses: Array) -> Array:
 
 
 def _closures(story: RunSummary, stamps_ns: Array, way: Array) -> list[dict[str, Any]]:
-    """The closures by verdict and by whether the mapper pruned them, with the key and the words of each."""
+    """The closures by verdict and by whether the mapper pruned them, with the key and the text of each."""
     pruned = {id(closure) for closure in story.pruned}
     groups: dict[tuple[str, bool], list[int]] = {}
     for k, closure in enumerate(story.closures):
@@ -108,7 +108,7 @@ def _objects(labels: list[str], xyz: Array) -> dict[str, Any]:
 
 
 def _names(labels: list[str], xyz: Array) -> list[tuple[str, Array]]:
-    """The names of heaps that are apart; what the detector has no name for has one only where nothing else is."""
+    """The names of clusters that are apart; an unnamed object has one only where nothing else is."""
     kept: list[tuple[str, Array]] = []
     for label, at in sorted(figures.heaps(labels, xyz), key=lambda heap: heap[0] == UNNAMED):
         if all(np.linalg.norm(at - other) > APART_M for _, other in kept):

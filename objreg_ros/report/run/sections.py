@@ -23,7 +23,7 @@ from objreg_ros.report.run.trajectory_error import root_mean_square
 View = dict[str, Any]
 
 OVERLAID = (
-    "Right: the second moment laid over the first by the constraint, magenta over green. Grey is agreement, coloured "
+    "Right: the second picture laid over the first by the constraint, magenta over green. Grey is agreement, coloured "
     "fringes are not; dark was not seen by both."
 )
 
@@ -57,13 +57,13 @@ def spaced(name: str) -> str:
 
 
 def judged(story: RunSummary) -> tuple[int, int]:
-    """How many constraints are false, and of how many truth tells."""
+    """How many constraints are false, and how many truth covers."""
     errors = sum(story.error(closure) is not None for closure in story.closures)
     return sum(map(story.is_false, story.closures)), errors
 
 
 def about_rows(about: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What a run was made with, line by line; nothing where its JSON does not tell."""
+    """What a run was made with, line by line; nothing where its JSON lacks it."""
     model = about.get("model") or {}
     rows = {
         "command": about.get("command"),
@@ -83,7 +83,7 @@ def _said(story: RunSummary) -> str:
 
 def _verdict(story: RunSummary) -> str:
     if not story.closures:
-        sure = "" if story.summary.get("findings") or not story.refusals else ": nothing in this run was sure enough"
+        sure = "" if story.summary.get("findings") or not story.refusals else ": no candidate was certain enough"
         return f"No loop was closed{sure}."
     labels = [label for closure in story.closures for label in closure.labels]
     seen = ", ".join(sorted(set(labels), key=lambda label: -labels.count(label))[:5])
@@ -114,7 +114,7 @@ def _tile(value: str, name: str, note: str, tone: str = "") -> View:
 
 
 def _refused_note(story: RunSummary) -> str:
-    """How many candidates were tried in vain, and how many more the table of reasons counts that were not tried."""
+    """How many candidates were refused, and how many more in the table of reasons were not tried."""
     counts = story.summary.get("rejected", {})
     untried = sum(counts.get(reason.value, 0) for reason in UNTRIED)
     tried = f"{sum(counts.values()) - untried} candidates refused"
@@ -133,27 +133,25 @@ def _change(before: float, after: float, source: str) -> str:
 
 
 def _way(story: RunSummary, tracks: Tracks | None) -> View:
-    """The drawings of the way; of the truth where there is no odometry, and of our own tracking without either."""
+    """The drawings of the trajectory; of the truth without odometry, and of our own tracking without either."""
     if tracks is not None:
-        stamps_ns, lines, words = tracks.stamps_ns, tracks.lines, _way_words(story)
+        stamps_ns, lines, text = tracks.stamps_ns, tracks.lines, _way_words(story)
     elif (true := story.true_way()) is not None:
         stamps_ns, lines = true[0], {"true": true[1]}
-        words = (
-            "From above. There is no odometry in this run: the way is that of the ground truth, and is not corrected."
-        )
+        text = "From above. There is no odometry in this run: the trajectory is the ground truth, and is not corrected."
     elif (tracked := story.tracked_way()) is not None:
         stamps_ns, lines = tracked[0], {"tracked": tracked[1][:, :3, 3]}
-        words = (
-            "From above. There is neither odometry nor ground truth in this run: the way is that of our own tracking, "
-            f"in the longest of its stretches, {len(stamps_ns)} of {len(story.glimpses)} frames, and is not corrected."
+        text = (
+            "From above. There is neither odometry nor ground truth in this run: the trajectory is our own tracking's, "
+            f"in its longest stretch, {len(stamps_ns)} of {len(story.glimpses)} frames, and is not corrected."
         )
     else:
-        words = "There is neither odometry nor ground truth in this run, and no track of the camera, so no way to draw."
-        return {"words": words, "legend": [], "drawing": None, "error": None, "scene": None}
+        text = "There is neither odometry nor ground truth in this run, and no track of the camera: no trajectory."
+        return {"words": text, "legend": [], "drawing": None, "error": None, "scene": None}
     names = {**NAMES, "accepted": "closure"}
     marks = [*lines, *sorted({figures.verdict(story, closure) for closure in story.closures})]
     return {
-        "words": words,
+        "words": text,
         "legend": [(mark, names.get(mark, "false closure" if mark == "false" else mark)) for mark in marks],
         "drawing": _in_both_widths(lambda width: figures.way(story, stamps_ns, lines, width)),
         "scene": scene(story, stamps_ns, lines, tracks),
@@ -169,29 +167,29 @@ def _in_both_widths(draw: Callable[[int], str], wide: int = figures.WIDE) -> Vie
 
 def _way_words(story: RunSummary) -> str:
     source = NAMES.get(story.source, story.source)
-    words = f"From above. Closures tie places that were seen twice; the pose graph takes the drift out of {source}."
+    text = f"From above. Closures tie places that were seen twice; the pose graph takes the drift out of {source}."
     if story.by_tracking:
-        words += f" {_pieces(story)}"
+        text += f" {_pieces(story)}"
     if story.pruned:
-        words += f" The mapper pruned {len(story.pruned)} of {len(story.closures)} closures."
+        text += f" The mapper pruned {len(story.pruned)} of {len(story.closures)} closures."
     if story.map.unsolved:
-        words += f" The corrected way is that of {source} here: {story.map.unsolved}."
+        text += f" The corrected trajectory is that of {source} here: {story.map.unsolved}."
     if story.left_out:
-        words += f" {story.left_out} frames are left out: their time is not later than that of the frames before them."
+        text += f" {story.left_out} frames are left out: their time is not later than that of the frames before them."
     across = len(story.closures) - len(of_one_clock(story.closures))
     if across:
-        words += f" {across} closures are left out: they tie two runs of the clock, and the map is of one."
-    return words
+        text += f" {across} closures are left out: they tie two runs of the clock, and the map is of one."
+    return text
 
 
 def _pieces(story: RunSummary) -> str:
     """What of our own tracking is drawn."""
     known = story.map
-    words = f"There is no odometry in this run: {len(known.frames)} of {len(story.glimpses)} frames are drawn, which "
-    words += f"closures tie out of {known.sessions} sessions." if known.sessions > 1 else "are of one session."
+    text = f"There is no odometry in this run: {len(known.frames)} of {len(story.glimpses)} frames are drawn, which "
+    text += f"closures tie out of {known.sessions} sessions." if known.sessions > 1 else "are of one session."
     if not known.sessions_apart:
-        return words
-    return f"{words} {known.frames_apart} frames in {known.sessions_apart} more sessions are not: nothing ties them."
+        return text
+    return f"{text} {known.frames_apart} frames in {known.sessions_apart} more sessions are not: nothing ties them."
 
 
 def _timeline(story: RunSummary) -> View | None:
@@ -200,12 +198,12 @@ def _timeline(story: RunSummary) -> View | None:
     entries = [("seen", "detected"), ("accepted", "closure"), ("refused", "refused candidate")]
     if any(map(story.is_false, story.closures)):
         entries.insert(2, ("false", "false closure"))
-    words = "What was detected, which moments were tied together, and what was refused and why."
+    text = "What was detected, which keyframes were tied together, and what was refused and why."
     if story.out_of_time:
         counts = ", ".join(f"{count} {what}" for what, count in story.out_of_time.items())
-        words += f" Left out: {counts}, more than an hour from the longest part of the run; are their stamps right?"
+        text += f" Left out: {counts}, more than an hour from the longest part of the run; are their stamps right?"
     drawing = _in_both_widths(lambda width: figures.timeline(story, width))
-    return {"words": words, "legend": entries, "drawing": drawing}
+    return {"words": text, "legend": entries, "drawing": drawing}
 
 
 def _reasons(story: RunSummary) -> list[View]:
@@ -234,7 +232,7 @@ def _browser(pairs: Sequence[Pair], drawn: Thumbnails, album: Album | None) -> V
 
 
 def _clouds(made: Clouds) -> View:
-    """What a pane draws in space, None where there is nothing, and which pairs it lacks."""
+    """What a pane draws in 3D, None where there is nothing, and which pairs it lacks."""
     data = {"moments": made.moments, "poses": made.poses, "absent": made.absent}
     return {"lacking": made.lacking, "data": data if made.poses else None}
 
@@ -256,7 +254,7 @@ def _row(pair: Pair) -> View:
 
 
 def _pane(pair: Pair) -> View:
-    """What the pane says of a pair beside its pictures."""
+    """The text of the pane beside the pictures of a pair."""
     return {
         "from": str(pair.told.from_ns),
         "to": str(pair.told.to_ns),
@@ -282,9 +280,7 @@ def _galleries(pairs: Sequence[Pair], story: RunSummary, album: Album) -> list[V
     by_identity = {id(pair.told): pair for pair in pairs}
     accepted = [by_identity[id(closure)] for closure in chosen_closures(story)]
     refused = [by_identity[id(refusal)] for refusal in chosen_refusals(story)]
-    tried = (
-        "Candidates that were tried and turned down. Right: the second moment laid over the first by the refused pose."
-    )
+    tried = "Candidates that were tried and refused. Right: the second picture laid over the first by the refused pose."
     both = (
         _gallery("Accepted registrations", OVERLAID, accepted, album),
         _gallery("Refused registrations", tried, refused, album),
@@ -292,16 +288,16 @@ def _galleries(pairs: Sequence[Pair], story: RunSummary, album: Album) -> list[V
     return [gallery for gallery in both if gallery["words"]]
 
 
-def _gallery(title: str, words: str, chosen: Sequence[Pair], album: Album) -> View:
+def _gallery(title: str, text: str, chosen: Sequence[Pair], album: Album) -> View:
     cards = [card for pair in chosen if (card := _card(pair, album))]
     whys = Counter(why for p in chosen if (why := album.lacking(p.told.from_ns) or album.lacking(p.told.to_ns)))
     reasons = "; ".join(why if count == 1 else f"{why} ({count} times)" for why, count in whys.most_common())
     lacking = f"No picture of {whys.total()} of these {len(chosen)}: {reasons}." if whys else ""
-    return {"title": title, "words": " ".join(filter(None, (words if cards else "", lacking))), "cards": cards}
+    return {"title": title, "words": " ".join(filter(None, (text if cards else "", lacking))), "cards": cards}
 
 
 def _card(pair: Pair, album: Album) -> View | None:
-    """Two moments side by side and over each other; None where the recording lacks a picture."""
+    """Two pictures side by side and over each other; None where the recording lacks a picture."""
     first, second = album.at(pair.told.from_ns), album.at(pair.told.to_ns)
     if first is None or second is None or first.rgb is None or second.rgb is None:
         return None

@@ -56,7 +56,7 @@ class Thumbnails:
 
 
 def thumbnails(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAGE_BYTES) -> Thumbnails:
-    """The pictures of pairs, the most interesting first; of what was tried, or has two moments at least."""
+    """The pictures of pairs, the most interesting first; of what was tried, or has two stamps at least."""
     drawn = Thumbnails()
     if album is None:
         return drawn

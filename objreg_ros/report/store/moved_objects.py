@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When which objects of a store were moved, as its closures tell.
+"""Which objects of a store were moved and when, by the evidence of its closures.
 
-A closure says how far an object went that stood in one of its views, where the other view looks through, and stands
-somewhere else in that one. So it was moved between the two. What several closures say of one object is put together: as
+A closure reports how far an object moved: one of its views shows the object at a place that is free space in the other
+view, and the other view shows it elsewhere. So it was moved between the two. The reports on one object are combined: as
 few moves as explain all of them, each within the time that all of its closures leave.
 """
 
@@ -22,14 +22,14 @@ from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registration.keyframe import Keyframe
 
 EVIDENCE = re.compile(r"moved (?P<label>.+) \[m\]")
-SAME_M = 1e-3  # the distance in the evidence and that of the two objects that it is of
+SAME_M = 1e-3  # between the distance in the evidence and that of its two objects
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Telling:
-    """What closure number ``closure`` says of one object: it went ``metres`` from ``there`` to ``here``.
+    """The report of closure number ``closure`` on one object: it moved by ``metres`` from ``there`` to ``here``.
 
-    ``stood (3,)`` is where it had stood in m, in the session of ``here``.
+    ``stood (3,)`` is its earlier position in m, in the session of ``here``.
     """
 
     closure: int
@@ -41,9 +41,9 @@ class Telling:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Move:
-    """One move of an object: at some time after ``there`` was seen and before ``here`` was, so ``closures`` say.
+    """One move of an object, after ``there`` was seen and before ``here`` was; ``closures`` is how many report it.
 
-    ``nearest`` is the telling of the two moments that are closest to each other.
+    ``nearest`` is the report whose two keyframes are closest in time.
     """
 
     there: Sighting
@@ -54,25 +54,25 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Moves:
-    """The ``known`` moves, the oldest first; ``untold`` counts what is said of keyframes that are no longer stored."""
+    """The ``known`` moves, the oldest first; ``untold`` counts reports on keyframes that are no longer stored."""
 
     known: tuple[Move, ...] = ()
     untold: int = 0
 
 
 def moves_in(store: Store, sightings: Sequence[Sighting]) -> Moves:
-    """What the closures of a store tell of objects that were moved; StoreError where they cannot be read."""
+    """The moves of objects that the closures of a store report; StoreError where they cannot be read."""
     ids: defaultdict[int, set[int]] = defaultdict(set)
     for sighting in sightings:
         ids[sighting.stamp_ns].add(sighting.keyframe_id)
-    told: list[Telling] = []
+    reports: list[Telling] = []
     untold = 0
     for number, closure in enumerate(store.closures()):
         for label, metres in _distances(closure):
             found = list(_tellings(store, ids, number, closure, label, metres))
-            told += found
+            reports += found
             untold += not found
-    moves = [move for of_one in _by_object(told) for move in _fewest(of_one)]
+    moves = [move for of_one in _by_object(reports) for move in _fewest(of_one)]
     return Moves(tuple(sorted(moves, key=lambda move: (move.here.keyframe_id, move.here.landmark))), untold)
 
 
@@ -85,7 +85,7 @@ def _distances(closure: LoopClosure) -> Iterator[tuple[str, float]]:
 def _tellings(
     store: Store, ids: dict[int, set[int]], number: int, closure: LoopClosure, label: str, metres: float
 ) -> Iterator[Telling]:
-    """Of the keyframes of both moments; two runs of one recording have the same moments, and it is true of both."""
+    """The reports on the keyframes of both stamps. Two runs of one recording share their stamps: it holds for both."""
     for from_id in sorted(ids.get(closure.from_ns, ())):
         for to_id in sorted(ids.get(closure.to_ns, ())):
             if from_id < to_id:
@@ -98,7 +98,7 @@ def _between(
     try:
         before, after = (store.keyframe(keyframe_id) for keyframe_id in ids)
     except StoreError:
-        return  # a damaged keyframe tells nothing
+        return  # a damaged keyframe gives no report
     there, here = (list(store.sightings(keyframe_id)) for keyframe_id in ids)
     gone, new = transform(inverse(T_from_to), _middles(before)), _middles(after)
     distances = np.linalg.norm(gone[:, None] - new[None], axis=-1)
@@ -113,10 +113,10 @@ def _middles(keyframe: Keyframe) -> Array:
     return np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3)
 
 
-def _by_object(told: Sequence[Telling]) -> list[list[Telling]]:
-    """The tellings of each object: landmarks are of one object where it is told to have gone from one to the other."""
+def _by_object(reports: Sequence[Telling]) -> list[list[Telling]]:
+    """The reports on each object: landmarks are of one object where a report joins them."""
     groups: list[tuple[set[int], list[Telling]]] = []
-    for telling in told:
+    for telling in reports:
         landmarks, of_one = {telling.there.landmark, telling.here.landmark}, [telling]
         for group in [group for group in groups if group[0] & landmarks]:
             groups.remove(group)
@@ -125,9 +125,9 @@ def _by_object(told: Sequence[Telling]) -> list[list[Telling]]:
     return [of_one for _, of_one in groups]
 
 
-def _fewest(told: Sequence[Telling]) -> Iterator[Move]:
-    """As few moves as explain all that is told: each lies in every span that begins before its first one ends."""
-    left = sorted(told, key=lambda telling: telling.here.keyframe_id)
+def _fewest(reports: Sequence[Telling]) -> Iterator[Move]:
+    """As few moves as explain all reports: each lies in every span that begins before its first one ends."""
+    left = sorted(reports, key=lambda telling: telling.here.keyframe_id)
     while left:
         end = left[0].here.keyframe_id
         together = [telling for telling in left if telling.there.keyframe_id < end]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A session of a store seen from above: the camera's way, where the objects are and which of them moved."""
+"""A session of a store from above: the camera's trajectory, the positions of the objects and their moves."""
 
 from __future__ import annotations
 

@@ -33,8 +33,8 @@ Colour = tuple[int, int, int]
 def draw(found: StoreSummary, pictures: Mapping[int, Array]) -> Array:
     """A picture (H, W, 3) uint8 RGB of a store: every session from above, in m, then a contact sheet of its objects.
 
-    ``pictures`` are the portraits by landmark; a landmark without one is not on the sheet. Dots are landmarks, as large
-    as they were seen often, the line is the camera's way, and an arrow leads from where a moved object stood.
+    ``pictures`` are the portraits by landmark; a landmark without one is not on the sheet. Dots are landmarks, larger
+    the more often they were seen. The line is the camera's trajectory. An arrow begins where a moved object stood.
     """
     maps = session_maps(found)
     if not maps:
@@ -122,26 +122,26 @@ def _name(sheet: Array, at: Mapping[Place, list[int]]) -> None:
     """The ids beside the dots, those that were seen most first; one that would lie upon another is left out."""
     taken = np.zeros(sheet.shape[:2], bool)
     for place in sorted(at, key=lambda place: -place.sightings):
-        words, (x, y) = str(place.landmark), at[place]
-        (width, height), _ = cv2.getTextSize(words, FONT, SMALL, 1)
+        text, (x, y) = str(place.landmark), at[place]
+        (width, height), _ = cv2.getTextSize(text, FONT, SMALL, 1)
         left, base = x + _radius(place) + 2, y + height // 2
         box = np.s_[base - height - 1 : base + 2, left : left + width]
         if not taken[box].any():
             taken[box] = True
-            _write(sheet, words, (left, base), INK)
+            _write(sheet, text, (left, base), INK)
 
 
 def _legend(counts: Mapping[str, int], colours: Mapping[str, Colour], width: int) -> Array:
     """The labels with their colours and how often each was seen, in as many rows as they need."""
     rows, x = [_blank(24, width)], 16
     for label, count in counts.items():
-        words = f"{label} {count}"
-        wide = cv2.getTextSize(words, FONT, SMALL, 1)[0][0] + 40
+        text = f"{label} {count}"
+        wide = cv2.getTextSize(text, FONT, SMALL, 1)[0][0] + 40
         if x + wide > width:
             rows.append(_blank(24, width))
             x = 16
         cv2.circle(rows[-1], (x, 12), 5, colours[label], -1, cv2.LINE_AA)
-        _write(rows[-1], words, (x + 10, 16), INK)
+        _write(rows[-1], text, (x + 10, 16), INK)
         x += wide
     return np.vstack(rows)
 

@@ -30,8 +30,8 @@ def store_page(found: StoreSummary, pictures: Mapping[int, Array]) -> str:
         moves=told_moves(found),
         legend=[(styles[label], f"{label} ({count})") for label, count in found.labels.items()],
         sessions=[
-            {**told, "drawing": {name: _drawn(one, styles, name) for name in WIDTHS}}
-            for told, one in zip(found.sessions, maps, strict=True)
+            {**session, "drawing": {name: _drawn(one, styles, name) for name in WIDTHS}}
+            for session, one in zip(found.sessions, maps, strict=True)
         ],
         objects=[_object(found, mark, pictures) for mark in found.landmarks],
     )  # fmt: skip
@@ -42,13 +42,13 @@ def _drawn(one: SessionMap, styles: Mapping[str, str], width: str) -> str:
     plot = Plot.equal(one.points, WIDTHS[width], least, most)
     plot.x_axis(f"{one.axes[0]} [m]")
     plot.y_axis(f"{one.axes[1]} [m]")
-    plot.line(one.way, "faint", "way of the camera")
+    plot.line(one.way, "faint", "camera trajectory")
     for title, stood, stands in one.moves:
         plot.line(np.array([stood, stands]), "false", f"moved: {title}")
         plot.dot(stood[0], stood[1], "refused", f"stood here: {title}", 4.0)
     for place in one.places:
-        words = f"{place.label} {place.landmark}, in {place.sightings} keyframes"
-        plot.dot(place.xy[0], place.xy[1], styles[place.label], words, 4.0 + min(place.sightings, 8) / 2)
+        text = f"{place.label} {place.landmark}, in {place.sightings} keyframes"
+        plot.dot(place.xy[0], place.xy[1], styles[place.label], text, 4.0 + min(place.sightings, 8) / 2)
         plot.text(plot.x(place.xy[0]) + 9, plot.y(place.xy[1]) + 4, str(place.landmark))
     return plot.svg(f"session {one.session} from above")
 

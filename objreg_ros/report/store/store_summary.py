@@ -23,7 +23,7 @@ MOST_VIEWS = 100  # are read for the noise of their depth
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StoreSummary:
-    """The whole of a store without its points."""
+    """A whole store without its points."""
 
     path: str
     bytes: int
@@ -102,20 +102,20 @@ def _depth_noise(store: Store) -> float | None:
     ids = store.keyframe_ids()
     chosen = np.unique(np.linspace(0, len(ids) - 1, min(len(ids), MOST_VIEWS)).round().astype(int)).tolist()
     noises = (_noise_of(store, ids[k]) for k in chosen)
-    told = [noise for noise in noises if noise is not None]
-    return float(np.median(told)) if told else None
+    known = [noise for noise in noises if noise is not None]
+    return float(np.median(known)) if known else None
 
 
 def _noise_of(store: Store, keyframe_id: int) -> float | None:
     try:
         view = store.keyframe(keyframe_id).view
     except StoreError:
-        return None  # a damaged keyframe leaves the others to tell
+        return None  # a damaged keyframe leaves the others
     return measured_noise(np.nan_to_num(view.xyz[..., 2], nan=0.0))
 
 
 def describe(found: StoreSummary) -> str:
-    """A store in a few lines for a reader."""
+    """A store in a few lines."""
     lines = [f"{found.path}: a store of objreg_ros, {found.bytes / 1e6:.1f} MB"]
     lines += ["  " + ", ".join(f"{count} {name}" for name, count in found.counts.items())]
     lines += ["  labels: " + (", ".join(f"{name} {count}" for name, count in found.labels.items()) or "none")]
@@ -132,14 +132,14 @@ def describe(found: StoreSummary) -> str:
 
 
 def told_moves(found: StoreSummary) -> list[str]:
-    """What closures tell of objects that were moved, a sentence each; what cannot be followed up is said too."""
-    told = [_told_move(found, move) for move in found.moves.known]
+    """The moves of objects that closures report, a sentence each; the last counts those that cannot be traced."""
+    sentences = [_move_sentence(found, move) for move in found.moves.known]
     if found.moves.untold:
-        told.append(f"{found.moves.untold} constraints tell of another, of keyframes that are no longer stored")
-    return told
+        sentences.append(f"{found.moves.untold} constraints report another, of keyframes that are no longer stored")
+    return sentences
 
 
-def _told_move(found: StoreSummary, move: Move) -> str:
+def _move_sentence(found: StoreSummary, move: Move) -> str:
     there, here, nearest = move.there, move.here, move.nearest
     stood, stands = (", ".join(f"{value:.2f}" for value in xyz) for xyz in (nearest.stood, nearest.here.position))
     landmarks = f"{there.landmark}" if there.landmark == here.landmark else f"{there.landmark}, now {here.landmark},"

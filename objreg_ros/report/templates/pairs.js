@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All pairs of a run: filter, sort, and a pane with the pictures of one. The pane tells its `.space` which pair it
-// shows by data-pair and an event "pair": what else can be drawn of a pair goes there.
+// All pairs of a run: filter, sort, and a pane with the pictures of one. The pane gives its `.space` the pair that
+// it shows, by data-pair and an event "pair": other drawings of a pair go there.
 "use strict";
 
 function browse(article) {
@@ -30,7 +30,7 @@ function browse(article) {
     section.querySelector(".count").textContent = shown + (shown === 1 ? " pair" : " pairs");
   }
 
-  // Rows without the number come last, whichever way.
+  // Rows without the number come last in both orders.
   function sort(head) {
     const down = head.getAttribute("aria-sort") !== "descending";
     for (const other of section.querySelectorAll("th[aria-sort]")) other.removeAttribute("aria-sort");
@@ -41,10 +41,10 @@ function browse(article) {
     body.append(...known, ...rows.filter((row) => isNaN(value(row))));
   }
 
-  function picture(figure, uri, words) {
+  function picture(figure, uri, caption) {
     figure.hidden = !uri;
     if (uri) figure.querySelector("img").src = uri;
-    if (words) figure.querySelector("figcaption").textContent = words;
+    if (caption) figure.querySelector("figcaption").textContent = caption;
   }
 
   function listEvidence(numbers) {

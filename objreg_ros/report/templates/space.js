@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one can turn about: the way with its closures and objects, and both clouds of the pair that a pane shows.
-// plotly.js is in the page as a gzip in base64, and is unpacked when one first asks for a drawing.
+// Drawings in 3D: the trajectory with its closures and objects, and both clouds of the pair that a pane shows.
+// plotly.js is in the page as a gzip in base64, and is unpacked for the first drawing.
 "use strict";
 
 (() => {
@@ -61,7 +61,7 @@
     return { type: "scatter3d", mode, x, y, z, name: packed.name, hoverinfo: "name", ...more };
   }
 
-  // Pairs of ends as one line with gaps, which carries the key and the words of each.
+  // Pairs of ends as one line with gaps, which carries the key and the text of each.
   function links(group) {
     const [x, y, z] = points(group).map((axis) => [...axis].flatMap((v, k) => (k % 2 ? [v, null] : [v])));
     const thrice = (values) => values.flatMap((value) => [value, value, value]);
@@ -105,13 +105,13 @@
     });
   }
 
-  // A place with a button and a drawing. `traces` gives what is drawn, or the words that say why there is nothing;
-  // `chosen` hears which point was clicked.
+  // A place with a button and a drawing. `traces` gives what is drawn, or a text of why there is nothing;
+  // `chosen` receives the point that was clicked.
   class Space {
     constructor(place, direction, traces, chosen) {
       Object.assign(this, { direction, traces, chosen, open: false, turn: 0, drawing: Promise.resolve() });
-      [this.button, this.told, this.plot] = [".draw", ".told", ".plot"].map((name) => place.querySelector(name));
-      this.words = this.button.textContent;
+      [this.button, this.notice, this.plot] = [".draw", ".notice", ".plot"].map((name) => place.querySelector(name));
+      this.label = this.button.textContent;
       this.button.addEventListener("click", () => { this.open = !this.open; this.draw(); });
       spaces.push(this);
     }
@@ -124,17 +124,17 @@
 
     async drawNow() {
       this.button.setAttribute("aria-expanded", this.open);
-      this.button.textContent = this.open ? "Hide the 3D view" : this.words;
+      this.button.textContent = this.open ? "Hide the 3D view" : this.label;
       const drawn = this.open ? this.traces() : "";
       this.plot.hidden = typeof drawn === "string";
-      this.told.textContent = this.plot.hidden ? drawn : "";
+      this.notice.textContent = this.plot.hidden ? drawn : "";
       if (!this.plot.hidden) await this.show(drawn).catch((error) => this.fail(error));
     }
 
     async show(drawn) {
-      if (!library) this.told.textContent = "A moment…";
+      if (!library) this.notice.textContent = "Loading…";
       const Plotly = await (library ??= load());
-      this.told.textContent = "";
+      this.notice.textContent = "";
       const isFirst = !this.plot.data;
       await Plotly.react(this.plot, drawn, layout(eyeFor(this.direction, drawn)), CONFIG);
       if (isFirst && this.chosen) this.plot.on("plotly_click", (event) => this.chosen(event.points[0]));
@@ -143,7 +143,7 @@
 
     fail(error) {
       this.plot.hidden = true;
-      this.told.textContent = `This browser cannot draw it in 3D: ${error.message}.`;
+      this.notice.textContent = `This browser cannot draw it in 3D: ${error.message}.`;
     }
   }
 
@@ -159,12 +159,12 @@
     const pane = article.querySelector("dialog.pane"), stored = article.querySelector("script.clouds");
     if (!stored) return;
     const place = pane.querySelector(".space"), paint = place.querySelector(".paint");
-    const told = JSON.parse(article.querySelector("script.data").textContent).pairs;
+    const pairs = JSON.parse(article.querySelector("script.data").textContent).pairs;
     let clouds;
     const space = new Space(place, [0.2, -1.3, 0.5], () => {
       const key = place.dataset.pair;
       clouds ??= JSON.parse(stored.textContent);
-      if (clouds.poses[key]) return pair(clouds, told[key], key, paint.querySelector("select").value);
+      if (clouds.poses[key]) return pair(clouds, pairs[key], key, paint.querySelector("select").value);
       return `There are no clouds of this pair: ${clouds.absent[key] ?? "no pose was found for it"}.`;
     });
     paint.addEventListener("change", () => space.draw());

@@ -18,7 +18,7 @@ def test_only_what_is_asked_for_is_written_and_told(tmp_path: Path) -> None:
     files.write(walk(), told.append)
     assert files.wanted == {"--mcap": tmp_path / "run.mcap"} and [f.name for f in tmp_path.iterdir()] == ["run.mcap"]
     (line,) = told
-    assert "the way (odometry, corrected, true), 5 closures, 3 moments with picture and cloud" in line
+    assert "the trajectory (odometry, corrected, true), 5 closures, 3 frames with picture and cloud" in line
 
 
 def test_without_the_sdk_the_error_names_the_extra_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:

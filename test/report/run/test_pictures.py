@@ -97,7 +97,7 @@ def test_an_album_says_why_it_has_no_picture_of_a_moment(tmp_path: Path) -> None
         album = Album(recording, inputs)
         assert album.at(10**9 + STEP_NS) is not None and album.lacking(10**9 + STEP_NS) == ""
         assert album.at(10**9) is None and "nothing on /image is within 50 ms of the depth" in album.lacking(10**9)
-        assert "nothing on /depth/image is within 50 ms of the moment" in album.lacking(5)
+        assert "nothing on /depth/image is within 50 ms of the stamp" in album.lacking(5)
         assert "no colour with depth" in Album(recording, replace(inputs, image=None)).lacking(10**9)
 
 

@@ -43,9 +43,9 @@ def test_findings_are_told_in_the_head_and_escaped() -> None:
     assert "<code>objreg inspect x</code>" in head and "no-images" in head
 
 
-def test_a_run_with_findings_does_not_say_that_nothing_was_sure_enough() -> None:
+def test_a_run_with_findings_does_not_say_that_no_candidate_was_certain_enough() -> None:
     told = {**summary(), "constraints": []}
-    assert view(told)["said"].endswith("nothing in this run was sure enough.")
+    assert view(told)["said"].endswith("no candidate was certain enough.")
     assert view({**told, "findings": [FINDING]})["said"] == "No loop was closed."
     assert view({"frames": 0, "constraints": []})["said"] == "No loop was closed."
 
@@ -60,7 +60,10 @@ def test_without_odometry_the_truth_is_drawn() -> None:
     told = summary()
     told["glimpses"] = [{**row, "T_odom_camera": None} for row in told["glimpses"]]
     way = view(told)["way"]
-    assert "that of the ground truth" in way["words"] and [mark for mark, _ in way["legend"]] == ["true", "accepted"]
+    assert "is the ground truth" in way["words"] and [mark for mark, _ in way["legend"]] == [
+        "true",
+        "accepted",
+    ]
     assert 'data-pair="c0"' in way["drawing"]["wide"]
     assert "neither odometry nor ground truth" in view(told, Truth([]))["way"]["words"]
 

@@ -50,7 +50,7 @@ def test_a_page_says_what_moved_or_that_no_constraint_shows_it(tmp_path: Path) -
     moved = store_page(survey(store_of(tmp_path / "b.db", shown, [told(1.0, 2.0), told(1.0, 9.0)])), {})
     assert "No constraint of this store shows that an object moved" in still
     assert "went 0.40 m between 0.0 s of session 0 and 1.0 s of session 0" in moved
-    assert "1 constraints tell of another" in moved
+    assert "1 constraints report another" in moved
 
 
 def test_labels_are_escaped_and_an_empty_store_has_a_page(tmp_path: Path) -> None:
