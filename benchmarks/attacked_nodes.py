@@ -72,7 +72,7 @@ def _labels() -> dict[str, Any]:
     return {"labels": to_msg.labels(good.NAMES)}
 
 
-ROOMS = {
+STAGES = {
     "detector": Room(_detector, dict),
     "segmenter": Room(_segmenter, _labels),
     "registrar": Room(_registrar, _labels),
@@ -109,8 +109,8 @@ class Siege:
     def __init__(self, room: str, folder: Path) -> None:
         from std_msgs.msg import Header
 
-        self.name, self.room, self.tally, self.folder = room, ROOMS[room], Tally(), folder
-        self.graph = borrowed("ros/graph.py").Graph(self.DOMAIN + list(ROOMS).index(room), folder)
+        self.name, self.room, self.tally, self.folder = room, STAGES[room], Tally(), folder
+        self.graph = borrowed("ros/graph.py").Graph(self.DOMAIN + list(STAGES).index(room), folder)
         self.graph.receive(Header, "/finished")
         self._options = ["-p reliable:=true", *self.options()]
         if room == "detector":
@@ -143,7 +143,7 @@ class Siege:
         from objreg_ros.bridge.node import qos
 
         if topic not in self.graph.publishers:
-            profile = qos.latched() if topic in ("labels", "constraints") else qos.room()
+            profile = qos.latched() if topic in ("labels", "constraints") else qos.stage()
             self.graph.publishers[topic] = self.graph.node.create_publisher(type(message), topic, profile)
         publisher = self.graph.publishers[topic]
         self.graph.wait_for(lambda: publisher.get_subscription_count() > 0, START_S, f"{self.name} on {topic}")

@@ -125,8 +125,8 @@ def figures(closures: Sequence[LoopClosure], refused: Sequence[Rejected], truth:
 
     ``tried`` are the pairs of keyframes that were registered.
     """
-    lone = [closure for closure in closures if closure.evidence["explained"] < 2]
-    several = [closure for closure in closures if closure.evidence["explained"] >= 2]
+    lone = [closure for closure in closures if closure.evidence["matched"] < 2]
+    several = [closure for closure in closures if closure.evidence["matched"] >= 2]
     right = Counter(rejected.reason.value for rejected in refused if is_right(rejected, truth))
     return {
         "tried": len(closures) + sum(rejected.reason not in UNTRIED for rejected in refused),

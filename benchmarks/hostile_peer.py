@@ -87,7 +87,9 @@ class Peer:
             "requests": (peers.REQUEST, [peers.pack_request(peers.Request(peers.Name(peers.HONEST, 1), 9.0, "peer"))]),
         }
         for name in self._said:
-            self._node.create_subscription(CompressedImage, f"{FLEET}/{name}", self._overhear(name), qos.room(depth=50))
+            self._node.create_subscription(
+                CompressedImage, f"{FLEET}/{name}", self._overhear(name), qos.stage(depth=50)
+            )
         self._bomb = peers._deflated(bytes(peers.BOMB))
         self._triggers = {
             f"/{ROBOT}/{name}": self._node.create_client(Trigger, f"/{ROBOT}/{name}")
@@ -131,7 +133,7 @@ class Peer:
             return
         data = array("B")
         data.frombytes(packed)
-        profile = qos.latched(qos.KEPT_SUMMARIES) if name == "summaries" else qos.room(depth=100)
+        profile = qos.latched(qos.KEPT_SUMMARIES) if name == "summaries" else qos.stage(depth=100)
         self._publish(f"{FLEET}/{name}", CompressedImage(format=FORMAT, data=data), profile)
 
     def _message(self) -> None:
@@ -143,7 +145,7 @@ class Peer:
         topic, message = self._draw.choice(
             (("objects", objects), ("view", view), ("view/camera_info", info), ("constraints", tie))
         )
-        profile = qos.latched(qos.KEPT_CONSTRAINTS) if topic == "constraints" else qos.room()
+        profile = qos.latched(qos.KEPT_CONSTRAINTS) if topic == "constraints" else qos.stage()
         self._publish(f"/{ROBOT}/{topic}", self._good.spoilt(self._draw, message), profile)
 
     def _publish(self, topic: str, message: Any, profile: Any) -> None:

@@ -66,7 +66,7 @@ class Robot:
         self.announced: set[int] = set()
         self._spin = rclpy.spin_once
         self._node.create_subscription(
-            PointCloud2, "landmarks", lambda m: self.announced.add(from_msg.stamp_ns(m)), qos.room(depth=1000)
+            PointCloud2, "landmarks", lambda m: self.announced.add(from_msg.stamp_ns(m)), qos.stage(depth=1000)
         )
         self._send("labels", to_msg.labels(NAMES), qos.latched())
 
@@ -95,7 +95,7 @@ class Robot:
         from objreg_ros.bridge.node import qos
 
         if topic not in self._publishers:
-            self._publishers[topic] = self._node.create_publisher(type(message), topic, profile or qos.room())
+            self._publishers[topic] = self._node.create_publisher(type(message), topic, profile or qos.stage())
         self._publishers[topic].publish(message)
 
 

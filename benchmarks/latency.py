@@ -28,10 +28,10 @@ import click
 import numpy as np
 from tables import RATE_HZ, table_story
 
-from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
+from objreg_ros.cli.live import STAGES, Live, Setup, run_live
 from objreg_ros.simulation.write import write_story
 
-PROGRAMS = {**{room: f"objreg_ros.{room}.node" for room in ROOMS}, "graph": "objreg_ros.graph"}
+PROGRAMS = {**{room: f"objreg_ros.{room}.node" for room in STAGES}, "graph": "objreg_ros.graph"}
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -57,7 +57,7 @@ class Witness:
         self._context.init()
         self._node = rclpy.create_node("witness", context=self._context)
         self._node.create_subscription(CompressedImage, "image/compressed", self._see, qos.sensor(True))
-        self._node.create_subscription(Header, "finished", self._finish, qos.room(depth=1000))
+        self._node.create_subscription(Header, "finished", self._finish, qos.stage(depth=1000))
         self._node.create_subscription(Odometry, "constraints", self._receive, qos.latched(qos.KEPT_CONSTRAINTS))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -210,7 +210,7 @@ def measure(path: Path, setup: Setup) -> dict[str, Any]:
         try:
             live = run_live(path, setup, Path(logs), lambda words: click.echo(words, err=True))
             usage = meter.figures(*witness.span)
-            latency = {node: witness.latency_ms(node) for node in ROOMS}
+            latency = {node: witness.latency_ms(node) for node in STAGES}
             told = witness.constraint_ms()
         finally:
             witness.close()

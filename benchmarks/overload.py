@@ -33,7 +33,7 @@ import click
 import numpy as np
 from latency import Meter, recorded
 
-from objreg_ros.cli.live import ROOMS, START_S, private_environment
+from objreg_ros.cli.live import STAGES, START_S, private_environment
 from objreg_ros.cli.processes import Processes
 from objreg_ros.memory.store import Store
 from objreg_ros.recording import open_recording
@@ -62,7 +62,7 @@ class Gauge:
         self._context = Context()
         self._context.init(args=[])
         node = Node("gauge", context=self._context)
-        node.create_subscription(DiagnosticArray, "/diagnostics", self._receive, qos.room(depth=100))
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._receive, qos.stage(depth=100))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
@@ -162,7 +162,7 @@ def measure(path: Path, seconds: float, speed: float, cores: int, keyframes: int
     with Processes(folder, environment) as processes:
         meter, gauge = Meter(), Gauge()
         with on_cores(cores):
-            for room in ROOMS:
+            for room in STAGES:
                 kept = ("-p", f"store:={store}", "-p", f"max_keyframes:={keyframes}")
                 more = ["--ros-args", *kept] if room == "registrar" else []
                 node = processes.start(room, f"objreg_ros.{room}.node", more)
@@ -171,7 +171,7 @@ def measure(path: Path, seconds: float, speed: float, cores: int, keyframes: int
         play(path, seconds, speed)
         stop, last = time.monotonic(), dict(gauge.told.get("registrar", {}))
         processes.require_alive()
-        books = {room: unaccounted(gauge.told[room]) for room in ROOMS}
+        books = {room: unaccounted(gauge.told[room]) for room in STAGES}
         ended = seconds_to_end(node)
         gauge.close()
         usage = meter.figures(start, stop)
@@ -186,8 +186,8 @@ def measure(path: Path, seconds: float, speed: float, cores: int, keyframes: int
         "seconds_from_sigint": ended,
         "unaccounted": books,
         "usage": usage,
-        "slope_mb_per_hour": {room: slope_mb_per_hour(meter.samples[room], warm) for room in ROOMS},
-        "memory_mb": {room: [(at - start, mb) for at, _, mb, _ in meter.samples[room]] for room in ROOMS},
+        "slope_mb_per_hour": {room: slope_mb_per_hour(meter.samples[room], warm) for room in STAGES},
+        "memory_mb": {room: [(at - start, mb) for at, _, mb, _ in meter.samples[room]] for room in STAGES},
         "rows": [{"at": at - start, **{key: told.get(key) for key in TOLD}} for at, told in gauge.rows if at >= start],
     }
 
@@ -200,10 +200,10 @@ def unaccounted(told: Mapping[str, str]) -> int:
 
 def _wait_for_nodes(gauge: Gauge, processes: Processes) -> None:
     deadline = time.monotonic() + START_S
-    while not set(ROOMS) <= gauge.told.keys():
+    while not set(STAGES) <= gauge.told.keys():
         processes.require_alive()
         if time.monotonic() > deadline:
-            raise click.ClickException(f"expected {', '.join(ROOMS)} to report, got {sorted(gauge.told)}")
+            raise click.ClickException(f"expected {', '.join(STAGES)} to report, got {sorted(gauge.told)}")
         time.sleep(0.2)
 
 

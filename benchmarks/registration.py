@@ -68,7 +68,7 @@ NOTHING = (180.0, 1e3)  # the error where there is no pose
 ASIDE = 0.18  # m from the middle of the table
 STORED = (0.0, 60.0, 120.0, 180.0)  # sides that an object is known from
 QUICK_SECONDS, LEAST = 40.0, 3  # after which a quick run begins no piece beyond the least
-ROOMS = 5  # strangers of each kind that are shown to each other
+STAGES = 5  # strangers of each kind that are shown to each other
 SYMMETRIC = ("soda_can", "bowl")
 TELLING = ("cereal_box", "chair", "monitor", "flashlight", "book", "keyboard")  # a cap tells next to nothing
 
@@ -158,7 +158,7 @@ class Bench:
 
     def _refuse(self, labels: Sequence[str], part: int, count: int) -> list[dict[str, Any]]:
         rng = np.random.default_rng([self.seed, 9, part])
-        rooms = range(ROOMS * part, ROOMS * (part + 1))
+        rooms = range(STAGES * part, STAGES * (part + 1))
         shots = {(label, n): self._stranger(label, n) for label in labels for n in rooms}
         rows = []
         for first, second in strangers(list(shots), count, rng):

@@ -18,7 +18,7 @@ from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, L
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose, rotation_between
-from objreg_ros.offline import Rooms, run_offline
+from objreg_ros.offline import Stages, run_offline
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.report.run.pictures import Album
@@ -194,7 +194,7 @@ def _frames(recording: Recording, asked: DetectorParams, reading: Reading) -> tu
     collector, segmenter = Collector(), Segmenter(SegmenterParams())
     if not reading.registered:
         segmenter.sensor.depth_to_colour = Unturned()
-    run_offline(stills(recording, inputs, reading.every), Rooms(detector, segmenter, collector, organise), inputs)
+    run_offline(stills(recording, inputs, reading.every), Stages(detector, segmenter, collector, organise), inputs)
     return collector.frames, detector.seen
 
 

@@ -64,7 +64,7 @@ def _publishers(node: Any) -> dict[str, Any]:
 
     clouds = {"objects": PointCloud2, "view": PointCloud2}
     kinds = {**clouds, "view/camera_info": CameraInfo, "gravity": Vector3Stamped, "odom": Odometry}
-    publishers = {topic: node.create_publisher(kind, topic, qos.room()) for topic, kind in kinds.items()}
+    publishers = {topic: node.create_publisher(kind, topic, qos.stage()) for topic, kind in kinds.items()}
     return {LATCHED: node.create_publisher(String, LATCHED, qos.latched()), **publishers}
 
 
@@ -106,10 +106,12 @@ def receive(folder: Path) -> None:
     told: dict[str, dict[str, str]] = {}
     closures: list[dict[str, Any]] = []
     hurried: set[int] = set()  # stamps of keyframes
-    node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: _note(told, message), qos.room(100))
+    node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: _note(told, message), qos.stage(100))
     kept = qos.latched(qos.KEPT_CONSTRAINTS)
     node.create_subscription(Odometry, "constraints", lambda message: closures.append(_closure(message)), kept)
-    node.create_subscription(DiagnosticArray, "refusals", lambda m: hurried.update(_hurried(m)), qos.room(qos.REFUSALS))
+    node.create_subscription(
+        DiagnosticArray, "refusals", lambda m: hurried.update(_hurried(m)), qos.stage(qos.REFUSALS)
+    )
     saver = node.create_client(Trigger, "registrar/save")
     words = lambda: {"told": told, "closures": closures, "hurried": len(hurried)}  # noqa: E731
     node.create_timer(1.0, lambda: _write(folder / TOLD, words()))

@@ -25,7 +25,7 @@ from objreg_ros.data import UNTRIED, Array
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.report.run.pictures import Album, overlay
-from objreg_ros.report.run.reasons import DROPS, REFUSALS, Words
+from objreg_ros.report.run.reasons import DROPS, REFUSALS, ReasonText
 
 FOLDER = Path(__file__).parent
 PICTURES = FOLDER / "pictures"
@@ -127,7 +127,7 @@ def reference(pictured: Mapping[str, str]) -> str:
     )
 
 
-def table(reasons: Mapping[str, Words]) -> str:
+def table(reasons: Mapping[str, ReasonText]) -> str:
     """A row for each reason, which leads to its section."""
     rows = "".join(f"| [`{name}`](#{name}) | {words.meaning} |\n" for name, words in reasons.items())
     return f"| reason | meaning |\n| --- | --- |\n{rows}"
@@ -138,7 +138,7 @@ def scheme(name: str) -> str:
     return f"![Scheme of {name}](pictures/{name}.svg)\n\n"
 
 
-def section(name: str, words: Words, picture: str, detail: str | None) -> str:
+def section(name: str, words: ReasonText, picture: str, detail: str | None) -> str:
     """What a reason means, its picture, what to do and what stands behind it."""
     pair = f"![A pair refused as {name}](pictures/{name}.jpg)\n\n*{detail}*\n\n" if detail is not None else ""
     behind = [f"[`{parameter}`](parameters.md#{parameter.partition('.')[0]})" for parameter in words.parameters]

@@ -119,11 +119,11 @@ SCHEMES = {
         words(110, 115, "what was seen"), words(288, 115, "what is seen there now"),
         words(200, 140, "one shape, two prints"),
     ),
-    "few_objects_explained": picture(
+    "few_objects_matched": picture(
         TWO, thing(170, 45), thing(180, 100), thing(222, 62, WRONG, ghost=True), thing(232, 88, WRONG, ghost=True),
         words(200, 140, "no object lies upon itself"),
     ),
-    "chains_disagree": picture(
+    "proposers_disagree": picture(
         thing(200, 70, size=30), camera(80, 70, 0, EARLIER), camera(320, 40, 165, NEW), camera(320, 105, 195, NEW),
         words(200, 140, "two poses fit as well: one of them is wrong"),
     ),

@@ -32,7 +32,7 @@ Data = TypeVar("Data")
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, eq_default=False, field_specifiers=(field,))
-def word(cls: type[Data]) -> type[Data]:
+def data_type(cls: type[Data]) -> type[Data]:
     """The decorator of a data type: a frozen dataclass with keyword fields and slots."""
     return dataclass(frozen=True, slots=True, kw_only=True, eq=False)(cls)
 
@@ -87,7 +87,7 @@ def _require_reach(owner: Any, xyz: Array, of: str) -> None:
     _require(owner, farthest <= limits.MOST_RANGE, f"{of} within {limits.MOST_RANGE:g} m", f"{farthest:g} m")
 
 
-@word
+@data_type
 class Intrinsics:
     """A pinhole camera without distortion: pixel ``u = fx x/z + cx``, pixel centres on integers."""
 
@@ -132,7 +132,7 @@ class Intrinsics:
         return step
 
 
-@word
+@data_type
 class ColourImage:
     """``rgb (H, W, 3) uint8`` as a camera saw it at ``stamp_ns``."""
 
@@ -149,7 +149,7 @@ def _span(low: float, high: float, size: int) -> slice:
     return slice(first, max(first, end))
 
 
-@word
+@data_type
 class Detections:
     """What the detector saw in one image: N boxes, best first, with the score and the label of each.
 
@@ -198,7 +198,7 @@ class Detections:
         return _span(y_min, y_max, height), _span(x_min, x_max, width)
 
 
-@word
+@data_type
 class PointCloud:
     """Points as a sensor sent them, before they become a `DepthImage`.
 
@@ -223,7 +223,7 @@ class PointCloud:
         return bool(self.xyz.shape[0] > 1)
 
 
-@word
+@data_type
 class DepthImage:
     """What the segmenter makes of every depth source.
 
@@ -261,7 +261,7 @@ class PointFlag(IntFlag):
     UNSUPPORTED = 16  # no support surface was found under the object
 
 
-@word
+@data_type
 class ObjectCloud:
     """One segmented object in one frame, in the camera frame, with a ``score`` in 0..1.
 
@@ -315,7 +315,7 @@ class ObjectCloud:
         return len(self) > 0 and bool((self.flags & flag).all())
 
 
-@word
+@data_type
 class View:
     """A frame at reduced size: what free space and texture are checked against, and what refinement holds on to.
 
@@ -339,7 +339,7 @@ class View:
         _require(self, nearest >= limits.LEAST_RANGE, f"points at z = {limits.LEAST_RANGE:g} m or farther", nearest)
 
 
-@word
+@data_type
 class Frame:
     """The segmenter's output for one stamp.
 
@@ -373,7 +373,7 @@ class Frame:
             _hold_place(self, "T_odom_camera")
 
 
-@word
+@data_type
 class ImuSample:
     """What an IMU measured at ``stamp_ns`` in the axes of ``frame_id``; None is what it does not measure.
 
@@ -397,7 +397,7 @@ class ImuSample:
                 _require(self, bool(np.isfinite(values).all()), f"finite {name}", values.tolist())
 
 
-@word
+@data_type
 class FeltGravity:
     """The direction of gravity at ``stamp_ns`` from a source other than the picture, in the axes of ``frame_id``.
 
@@ -415,7 +415,7 @@ class FeltGravity:
         _require(self, abs(length - 1) < 1e-6, "gravity of length 1", length)
 
 
-@word
+@data_type
 class Odometry:
     """The pose of a body in the odometry frame at ``stamp_ns``."""
 
@@ -428,7 +428,7 @@ class Odometry:
         _hold_place(self, "T_odom_body")
 
 
-@word
+@data_type
 class Alignment:
     """A registration and its evidence.
 
@@ -460,7 +460,7 @@ class Alignment:
             _hold(self, name, np.float64, shape, {})
 
 
-@word
+@data_type
 class ObjectMatch:
     """An object that lies upon itself under a closure: its label and the id of its landmark."""
 
@@ -468,7 +468,7 @@ class ObjectMatch:
     object_id: int
 
 
-@word
+@data_type
 class Observation:
     """An object as a keyframe saw it: its label, the id of its landmark, and its middle ``xyz (3,)`` m in the camera.
 
@@ -503,7 +503,7 @@ def robot_of(frame_id: str, robots: Sequence[str]) -> str:
     return next((robot for robot in sorted(robots, key=len, reverse=True) if frame_id.startswith(f"{robot}/")), "")
 
 
-@word
+@data_type
 class LoopClosure:
     """Two keyframes that saw the same place: ``T_from_to`` maps points of the camera at *to* into the camera at *from*.
 
@@ -554,7 +554,7 @@ class LoopClosure:
         return {name["label"]: metres for name, metres in found if name}
 
 
-@word
+@data_type
 class Relocalised:
     """Where the camera is in the map of an earlier ``session``: the frame that the poses of its keyframes are in.
 
@@ -589,8 +589,8 @@ class Reason(Enum):
     LOW_OVERLAP = "low_overlap"
     FREE_SPACE = "free_space_violated"
     TEXTURE = "texture_disagrees"
-    FEW_OBJECTS = "few_objects_explained"
-    CHAINS_DISAGREE = "chains_disagree"
+    FEW_OBJECTS = "few_objects_matched"
+    PROPOSERS_DISAGREE = "proposers_disagree"
     GRAVITY = "gravity_not_kept"
     IMPLAUSIBLE_MOTION = "implausible_motion"
     ODOMETRY = "odometry_disagrees"
@@ -610,7 +610,7 @@ UNTRIED = frozenset(
 """Reasons for which nothing was registered."""
 
 
-@word
+@data_type
 class Rejected:
     """A refused closure: the reason, and the numbers behind it in ``detail``.
 

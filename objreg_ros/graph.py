@@ -30,7 +30,7 @@ NODES: dict[str, Callable[[IntraProcessBus], NodeBase]] = {
     "keyframer": KeyframerNode,
     "mapper": MapperNode,
 }
-ROOMS = ("detector", "segmenter", "registrar")
+STAGES = ("detector", "segmenter", "registrar")
 
 
 def chosen(words: Sequence[str]) -> list[str]:
@@ -38,7 +38,7 @@ def chosen(words: Sequence[str]) -> list[str]:
     own = list(words[: words.index("--ros-args")] if "--ros-args" in words else words)
     parser = argparse.ArgumentParser("objreg_graph", description="The nodes of objreg_ros in one process.")
     parser.add_argument("nodes", nargs="*", metavar="node", help=f"of {', '.join(NODES)}; the first three if none")
-    asked = parser.parse_args(own).nodes or ROOMS
+    asked = parser.parse_args(own).nodes or STAGES
     for name in asked:
         if name not in NODES:
             parser.error(f"expected nodes of {', '.join(NODES)}, got {name}")

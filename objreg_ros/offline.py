@@ -109,7 +109,7 @@ class Registers(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Rooms:
+class Stages:
     """Detector, segmenter and registrar, and how a cloud becomes a depth image."""
 
     detector: Detects
@@ -118,9 +118,9 @@ class Rooms:
     organise: Callable[[PointCloud, Any], DepthImage]
 
 
-def build_rooms(
+def build_stages(
     detector: DetectorParams, segmenter: SegmenterParams, registrar: RegistrarParams, detects: Detects | None = None
-) -> tuple[Rooms, Callable[[], None]]:
+) -> tuple[Stages, Callable[[], None]]:
     """The stages by their parameters, and what closes them. OSError and ValueError as the stages raise them.
 
     ``detects`` takes the place of the detector: what remembers pictures that it has seen before, say.
@@ -137,7 +137,7 @@ def build_rooms(
     segments.warm()
     warm(registrar)
     registers = Registrar(registrar)
-    return Rooms(detects, segments, registers, organise), registers.close
+    return Stages(detects, segments, registers, organise), registers.close
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,12 +276,12 @@ class Line:
     """
 
     def __init__(
-        self, rooms: Rooms, inputs: Inputs, timing: Timing, max_frames: int | None = None, recorded: bool = False
+        self, stages: Stages, inputs: Inputs, timing: Timing, max_frames: int | None = None, recorded: bool = False
     ) -> None:
         self.run = Run()
         self._recorded = recorded
         self._names: dict[int, str] = {}  # of the numbers that another detector says
-        self._rooms, self._timing, self._max_frames = rooms, timing, max_frames
+        self._stages, self._timing, self._max_frames = stages, timing, max_frames
         self._from_points = inputs.points is not None
         self._raw = lenses.raw_pictures(timing.rectified, inputs.depth or inputs.points, inputs.image)
         self._camera_info: Any = None
@@ -372,9 +372,9 @@ class Line:
         """Let out what waits."""
         self._segment(self._views.flush())
         self._track(self._frames.flush())
-        self._note(self._rooms.registrar.finish(self._stream.finish()))
+        self._note(self._stages.registrar.finish(self._stream.finish()))
         self.run.findings, self.run.measured_mount = self._stream.findings, self._stream.mount
-        sensor = self._rooms.segmenter.sensor
+        sensor = self._stages.segmenter.sensor
         self.run.depth_to_colour = sensor.depth_to_colour.text()
         self.run.depth_noise, self.run.depth_lag = sensor.noise, sensor.lag
         return self.run
@@ -397,7 +397,7 @@ class Line:
         with self._timed("decode"):
             image = from_msg.image(message)
         with self._timed("detect"):
-            return self._rooms.detector.detect(image)
+            return self._stages.detector.detect(image)
 
     def _feed(self, name: str, stamp_ns: int, payload: Any) -> None:
         if name in self._views.queues:
@@ -426,7 +426,7 @@ class Line:
         with self._timed("segment"):
             sigma_deg = None if felt is None else felt.gravity_sigma_deg
             gravity = gravity if felt is None else felt.gravity
-            segmenter = self._rooms.segmenter
+            segmenter = self._stages.segmenter
             frame = as_sent(segmenter.segment(detections, depth, gravity, gravity_sigma_deg=sigma_deg))
         self._note_gravity(segmenter.choice)
         return frame, detections
@@ -454,7 +454,7 @@ class Line:
             found = self._found(match, seen.depth, seen.camera_info)
             return seen.depth, lenses.detections(found, seen.camera_info, seen.raw)
         cloud = colour_frame.in_optical_frame(from_msg.point_cloud(match["depth"]), picture_frame, find_pose)
-        depth = self._rooms.organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
+        depth = self._stages.organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
         return depth, lenses.detections(self._found(match, depth, None), self._camera_info, self._raw, cloud)
 
     def _found(self, match: Match, depth: DepthImage, camera_info: Any) -> Detections:
@@ -475,9 +475,9 @@ class Line:
             self.run.frames += 1
             self.run.glimpses.append(glimpse(frame, labels))
             with self._timed("register"):
-                outcome = self._rooms.registrar.process(frame)
+                outcome = self._stages.registrar.process(frame)
             if frame.T_odom_camera is None:
-                self.run.glimpses[-1]["tracked"] = tracked(self._rooms.registrar)
+                self.run.glimpses[-1]["tracked"] = tracked(self._stages.registrar)
             self._note(outcome)
 
     def _on_of_mount(self, text: str) -> None:
@@ -510,7 +510,7 @@ class Line:
 
 def run_offline(
     records: Iterable[Record],
-    rooms: Rooms,
+    stages: Stages,
     inputs: Inputs,
     timing: Timing | None = None,
     max_frames: int | None = None,
@@ -522,7 +522,7 @@ def run_offline(
     ``on_frame`` receives how many frames are through, those that were left out among them. ``recorded`` are detections
     that take the place of the detector's.
     """
-    line = Line(rooms, inputs, timing or Timing(), max_frames, recorded is not None)
+    line = Line(stages, inputs, timing or Timing(), max_frames, recorded is not None)
     name_of = {topic: name for name, topic in inputs.chosen().items()} | (recorded.topics if recorded else {})
     for record in records:
         name = "tf" if is_moving(record.topic, record.msgtype) else name_of.get(record.topic)

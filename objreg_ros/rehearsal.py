@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame
-from objreg_ros.offline import Rooms, Run, Timing, run_offline
+from objreg_ros.offline import Run, Stages, Timing, run_offline
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import camera_frame, frame_tree, moving_topics
 from objreg_ros.recording.record import Record, Recording
@@ -82,9 +82,9 @@ def rehearse(
     source: Recording, inputs: Inputs, frames: int = FRAMES, on_frame: Callable[[int], None] = lambda frames: None
 ) -> Run:
     """The run of the first ``frames`` of a recording. ``on_frame`` as in `run_offline`."""
-    rooms = Rooms(SeesNothing(), _CutsNothing(), _ClosesNothing(), organise)
+    stages = Stages(SeesNothing(), _CutsNothing(), _ClosesNothing(), organise)
     timing = Timing(frames=frame_tree(source, camera_frame(source, inputs)))
-    return run_offline(_beginning(source, inputs, frames), rooms, inputs, timing, on_frame=on_frame)
+    return run_offline(_beginning(source, inputs, frames), stages, inputs, timing, on_frame=on_frame)
 
 
 def _beginning(source: Recording, inputs: Inputs, frames: int) -> Iterator[Record]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rooms that say simple things, for tests of what lies between them."""
+"""Stages that say simple things, for tests of what lies between them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from objreg_ros.data import (
     View,
 )
 from objreg_ros.geometry import back_project, inverse
-from objreg_ros.offline import Rooms
+from objreg_ros.offline import Stages
 from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
 from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
 
@@ -124,6 +124,6 @@ def no_clouds(cloud: PointCloud, camera: object) -> DepthImage:
     raise AssertionError("no cloud was sent")
 
 
-def simple_rooms() -> tuple[Rooms, Chain]:
+def simple_rooms() -> tuple[Stages, Chain]:
     chain = Chain()
-    return Rooms(OneBox(), OneCloud(), chain, no_clouds), chain
+    return Stages(OneBox(), OneCloud(), chain, no_clouds), chain

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.graph import ROOMS, chosen
+from objreg_ros.graph import STAGES, chosen
 
 
 def test_without_names_it_is_the_three_rooms() -> None:
-    assert chosen([]) == chosen(["--ros-args", "-p", "detector:threshold:=0.4"]) == list(ROOMS)
+    assert chosen([]) == chosen(["--ros-args", "-p", "detector:threshold:=0.4"]) == list(STAGES)
 
 
 def test_nodes_are_made_in_the_order_of_a_frame_whatever_the_order_of_their_names() -> None:

@@ -12,7 +12,7 @@ import pytest
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
 PACKAGE = Path(__file__).resolve().parents[1] / "objreg_ros"
-ROOMS = ("detector", "segmenter", "registrar", "mapper")
+STAGES = ("detector", "segmenter", "registrar", "mapper")
 # The registrar's own folders: each may import those before it, in the order in which a pair of keyframes goes.
 FLOORS = (
     *("registration.params", "registration.labels", "registration.keyframe", "registration.candidate"),
@@ -101,13 +101,13 @@ def allowed(importer: str, imported: str) -> bool:
         return imported == "cli"
     if importer == "graph":  # all nodes in one process
         return imported in (
-            *(f"{room}.node" for room in ROOMS),
+            *(f"{room}.node" for room in STAGES),
             "keyframes.node",
             "bridge.node.node_base",
             "bridge.node.intra_process",
             "bridge.node.spin",
         )
-    if room in ROOMS and importer.endswith(".node"):
+    if room in STAGES and importer.endswith(".node"):
         return below(imported, room, "data", "bridge", "share", "plausibility") or (
             room == "registrar" and floor(imported) is not None
         )
@@ -119,7 +119,7 @@ def allowed(importer: str, imported: str) -> bool:
             and floor(imported) is not None
             and floor(imported) <= floor(importer)
         )
-    if room in ROOMS:
+    if room in STAGES:
         return below(imported, room, "data", "geometry", "params")
     if room == "adapters":
         return below(imported, "adapters", "mapper", "bridge", *CORE) and imported != "mapper.node"
@@ -136,7 +136,7 @@ def allowed(importer: str, imported: str) -> bool:
     if room in HOUSE:
         return below(
             imported,
-            *(*ROOMS, "registration", "keyframes", "memory", "plausibility", "recording"),
+            *(*STAGES, "registration", "keyframes", "memory", "plausibility", "recording"),
             *(*CORE, *HOUSE, *FREE_BRIDGE),
         ) and not imported.endswith(".node")
     return False

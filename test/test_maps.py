@@ -9,7 +9,7 @@ import re
 
 import pytest
 
-ROOMS = (
+STAGES = (
     *("registrar", "memory", "keyframes", "registration"),
     *(f"registration.{name}" for name in ("kernels", "shapes", "prepare", "score", "refine", "certainty", "propose")),
     "registration.gate",
@@ -17,7 +17,7 @@ ROOMS = (
 VERBS = {"track", "search", "process"}
 
 
-@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("room", STAGES)
 def test_the_map_names_every_module_of_the_folder_and_no_other(room: str) -> None:
     package = importlib.import_module(f"objreg_ros.{room}")
     modules = {module.name for module in pkgutil.iter_modules(package.__path__) if not module.ispkg}

@@ -36,25 +36,25 @@ MS = 1_000_000
 
 
 def test_every_frame_goes_through_with_its_odometry() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(records(4), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run = run_offline(records(4), stages, INPUTS)
     assert (run.frames, run.detections, run.objects, len(run.closures)) == (4, 4, 4, 3)
     assert [frame.T_odom_camera[0, 3] for frame in chain.frames] == pytest.approx([0, 0.1, 0.2, 0.3])
     assert chain.finished and not run.dropped
 
 
 def test_colour_reaches_the_segmenter_registered_to_depth() -> None:
-    rooms, chain = simple_rooms()
-    run_offline(records(3), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run_offline(records(3), stages, INPUTS)
     assert [frame.objects[0].rgb.tolist() for frame in chain.frames] == [[[i, 20, 30]] for i in range(3)]
     assert [round(float(frame.objects[0].xyz[0, 2]), 3) for frame in chain.frames] == [1.0, 1.001, 1.002]
 
 
 @pytest.mark.parametrize("topic", ["/yolo/detections", "/yolo/instance_masks"])
 def test_recorded_detections_take_the_place_of_the_detector(topic: str) -> None:
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
     recorded = RecordedDetections(topic, "/yolo/label_info")
-    run = run_offline(detected(4), rooms, INPUTS, recorded=recorded)
+    run = run_offline(detected(4), stages, INPUTS, recorded=recorded)
     assert (run.frames, run.detections, run.objects) == (4, 4, 4) and not run.dropped
     assert [row["labels"] for row in run.glimpses] == [["mug"]] * 4
     assert "detect" not in run.stage_s and chain.frames[1].T_odom_camera is not None
@@ -64,16 +64,16 @@ def test_recorded_detections_take_the_place_of_the_detector(topic: str) -> None:
 
 def test_recorded_boxes_and_masks_are_those_of_their_picture() -> None:
     for topic in ("/yolo/detections", "/yolo/instance_masks"):
-        rooms, _ = simple_rooms()
+        stages, _ = simple_rooms()
         segmented: list[Detections] = []
-        segment = rooms.segmenter.segment
+        segment = stages.segmenter.segment
 
         def seen(found: Detections, *rest: Any, into: list = segmented, then: Any = segment, **more: Any) -> Frame:
             into.append(found)
             return then(found, *rest, **more)
 
-        rooms.segmenter.segment = seen  # type: ignore[method-assign]
-        run_offline(detected(3), rooms, INPUTS, recorded=RecordedDetections(topic))
+        stages.segmenter.segment = seen  # type: ignore[method-assign]
+        run_offline(detected(3), stages, INPUTS, recorded=RecordedDetections(topic))
         assert [found.xyxy.tolist() for found in segmented] == [[[20, 12, 40, 24]]] * 3
         assert {found.image_hw for found in segmented} == {(48, 64)}
         assert [found.instances is not None for found in segmented] == [topic.endswith("masks")] * 3
@@ -92,22 +92,22 @@ def test_a_picture_whose_recorded_detections_are_missing_or_broken_is_dropped_wi
 
 
 def test_colour_can_be_left_out() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(records(3), rooms, INPUTS, Timing(colour=False))
+    stages, chain = simple_rooms()
+    run = run_offline(records(3), stages, INPUTS, Timing(colour=False))
     assert run.frames == run.detections == 3
     assert [frame.objects[0].rgb for frame in chain.frames] == [None] * 3
 
 
 def test_without_odometry_frames_go_through_without_it() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(records(3), rooms, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))
+    stages, chain = simple_rooms()
+    run = run_offline(records(3), stages, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))
     assert run.frames == 3 and all(frame.T_odom_camera is None for frame in chain.frames)
     assert run.rejected == {"no_candidate": 2}
 
 
 def test_a_run_can_stop_early() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(records(9), rooms, INPUTS, max_frames=4)
+    stages, chain = simple_rooms()
+    run = run_offline(records(9), stages, INPUTS, max_frames=4)
     assert run.frames == len(chain.frames) == 4 and chain.finished
 
 
@@ -126,15 +126,15 @@ def at_30_hz(count: int, depth_late_ms: float = 0.0) -> list[Record]:
 
 @pytest.mark.parametrize("depth_late_ms", [0.0, 9.0, 15.0, -9.0])
 def test_pictures_that_come_faster_than_they_are_wanted_are_surplus_with_their_depth(depth_late_ms: float) -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(at_30_hz(12, depth_late_ms), rooms, INPUTS, Timing(max_rate=10.0))
+    stages, chain = simple_rooms()
+    run = run_offline(at_30_hz(12, depth_late_ms), stages, INPUTS, Timing(max_rate=10.0))
     taken = [round((frame.stamp_ns / MS - 1000 - depth_late_ms) * 30 / 1000) for frame in chain.frames]
     assert taken == [0, 3, 6, 9] and run.dropped == {"depth_surplus": 8}
 
 
 def test_surplus_pictures_are_not_decoded() -> None:
-    rooms, _ = simple_rooms()
-    run = run_offline(at_30_hz(12), rooms, INPUTS, Timing(max_rate=10.0))
+    stages, _ = simple_rooms()
+    run = run_offline(at_30_hz(12), stages, INPUTS, Timing(max_rate=10.0))
     assert len(run.stage_s["detect"]) == len(run.stage_s["segment"]) == 4
 
 
@@ -143,27 +143,27 @@ def without(topic: str, stamp_ns: int) -> Iterator[Record]:
 
 
 def test_a_depth_image_without_colour_is_dropped_with_a_reason() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(without("/image", 1100 * MS), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run = run_offline(without("/image", 1100 * MS), stages, INPUTS)
     assert [frame.stamp_ns // MS for frame in chain.frames] == [1000, 1200, 1300]
     assert run.dropped == {"depth_unmatched": 1}
 
 
 def test_frames_without_odometry_tell_where_our_own_tracking_has_the_camera() -> None:
-    rooms, _ = simple_rooms()
-    run = run_offline(records(3), rooms, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))
+    stages, _ = simple_rooms()
+    run = run_offline(records(3), stages, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))
     assert [row["tracked"] for row in run.glimpses] == [{"session": 0, "T_session_camera": np.eye(4).tolist()}] * 3
     assert not any("tracked" in row for row in run_offline(records(3), simple_rooms()[0], INPUTS).glimpses)
 
 
 def test_a_frame_whose_odometry_was_lost_goes_through_without() -> None:
-    rooms, chain = simple_rooms()
-    run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run_offline(without("/odom", 1100 * MS), stages, INPUTS)
     assert [frame.T_odom_camera is None for frame in chain.frames] == [False, True, False, False]
 
 
 def test_a_frame_between_two_odometry_messages_has_a_pose_between_theirs() -> None:
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
     wanted = {1000 * MS: 970, 1100 * MS: 1070, 1200 * MS: 1170, 1300 * MS: 1270}  # each 30 ms before its frame
     shifted = []
     for record in records(4):
@@ -174,24 +174,24 @@ def test_a_frame_between_two_odometry_messages_has_a_pose_between_theirs() -> No
             )
             record = Record.of("/odom", message, early)
         shifted.append(record)
-    run_offline(sorted(shifted, key=lambda record: record.stamp_ns), rooms, INPUTS)
+    run_offline(sorted(shifted, key=lambda record: record.stamp_ns), stages, INPUTS)
     assert [frame.T_odom_camera[0, 3] for frame in chain.frames[:3]] == pytest.approx([0.03, 0.13, 0.23])
     assert chain.frames[3].T_odom_camera is None  # nothing came after it, and the last is more than 20 ms away
 
 
 def test_the_mounting_of_the_camera_is_applied() -> None:
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
     T_base_camera = np.eye(4)
     T_base_camera[2, 3] = 0.7
-    run_offline(records(2), rooms, INPUTS, Timing(T_base_camera=T_base_camera))
+    run_offline(records(2), stages, INPUTS, Timing(T_base_camera=T_base_camera))
     assert [frame.T_odom_camera[2, 3] for frame in chain.frames] == [0.7, 0.7]
 
 
 def test_gravity_comes_from_a_level_odometry_where_there_is_one() -> None:
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
     looking_along_x = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
     timing = Timing(level_odom=True, T_level_camera=looking_along_x @ turned_about_x(np.radians(30.0)))
-    run_offline(without("/odom", 1100 * MS), rooms, INPUTS, timing)
+    run_offline(without("/odom", 1100 * MS), stages, INPUTS, timing)
     tilted = [0, np.cos(np.radians(30)), -np.sin(np.radians(30))]
     for frame, expected in zip(chain.frames, (tilted, [0, 1, 0], tilted, tilted), strict=True):
         np.testing.assert_allclose(frame.gravity, expected, atol=1e-6)
@@ -206,33 +206,33 @@ def felt(degrees: float, frame_id: str = "camera") -> Iterator[Record]:
 
 
 def test_gravity_comes_from_an_imu_in_the_cameras_frame_with_how_sure_it_is() -> None:
-    rooms, chain = simple_rooms()
-    run_offline(felt(30.0), rooms, replace(INPUTS, imu="/imu"))
+    stages, chain = simple_rooms()
+    run_offline(felt(30.0), stages, replace(INPUTS, imu="/imu"))
     assert len(chain.frames) == 4
     for frame in chain.frames:
         expected = [0, np.cos(np.radians(30)), np.sin(np.radians(30))]
         np.testing.assert_allclose(frame.gravity, expected, atol=1e-4)
-    assert 1.0 < rooms.segmenter.heard_sigma_deg[-1] < rooms.segmenter.heard_sigma_deg[0] < 3.1
+    assert 1.0 < stages.segmenter.heard_sigma_deg[-1] < stages.segmenter.heard_sigma_deg[0] < 3.1
 
 
 def test_the_mounting_of_the_imu_is_applied_and_without_one_it_tells_nothing() -> None:
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
     timing = Timing(T_camera_imu=turned_about_x(np.radians(-30.0)))
-    run_offline(felt(30.0, "imu"), rooms, replace(INPUTS, imu="/imu"), timing)
+    run_offline(felt(30.0, "imu"), stages, replace(INPUTS, imu="/imu"), timing)
     for frame in chain.frames:
         np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-4)
-    rooms, chain = simple_rooms()
-    run = run_offline(felt(30.0, "imu"), rooms, replace(INPUTS, imu="/imu"))
-    assert rooms.segmenter.heard_sigma_deg == [None] * 4 and run.frames == 4
+    stages, chain = simple_rooms()
+    run = run_offline(felt(30.0, "imu"), stages, replace(INPUTS, imu="/imu"))
+    assert stages.segmenter.heard_sigma_deg == [None] * 4 and run.frames == 4
     assert run.summary(Truth([]))["gravity"]["imu_passed_over"] == {"unknown_frame": 4}
 
 
 def test_an_imu_that_measures_nonsense_ends_nothing_and_is_counted() -> None:
-    rooms, _ = simple_rooms()
+    stages, _ = simple_rooms()
     nan = Record.of("/imu", messages.imu((np.nan, 0, 0), None, 1050 * MS, "camera"), 1050 * MS)
     zero = Record.of("/imu", messages.imu((0, 0, 0), None, 1060 * MS, "camera"), 1060 * MS)
     said = sorted([*records(4), nan, zero], key=lambda record: record.stamp_ns)
-    run = run_offline(said, rooms, replace(INPUTS, imu="/imu"))
+    run = run_offline(said, stages, replace(INPUTS, imu="/imu"))
     assert run.frames == 4 and run.dropped == {"malformed_imu": 1}
     assert run.gravity()["imu_passed_over"] == {"no_acceleration": 1}
 
@@ -252,8 +252,8 @@ def broken() -> Iterator[Record]:
 
 
 def test_broken_messages_are_counted_and_the_run_goes_on() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(broken(), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run = run_offline(broken(), stages, INPUTS)
     assert len(chain.frames) == 1
     assert run.dropped == {"malformed_depth": 1, "malformed_image": 1, "depth_unmatched": 1}
     assert "got 'bayer'" in run.complaints["malformed_image"]
@@ -280,8 +280,8 @@ def undecodable(topic: str, stamp_ns: int) -> Iterator[Record]:
 def test_a_message_that_does_not_decode_is_counted_and_the_run_goes_on(
     topic: str, frames: int, dropped: dict[str, int]
 ) -> None:
-    rooms, _ = simple_rooms()
-    run = run_offline(undecodable(topic, 1100 * MS), rooms, INPUTS)
+    stages, _ = simple_rooms()
+    run = run_offline(undecodable(topic, 1100 * MS), stages, INPUTS)
     assert (run.frames, run.dropped) == (frames, dropped)
     assert "expected a whole bag" in next(iter(run.complaints.values()))
 
@@ -291,9 +291,9 @@ def test_a_recording_that_breaks_off_ends_the_run() -> None:
         yield from records(2)
         raise ValueError("expected a whole bag")
 
-    rooms, _ = simple_rooms()
+    stages, _ = simple_rooms()
     with pytest.raises(ValueError, match="expected a whole bag"):
-        run_offline(breaking(), rooms, INPUTS)
+        run_offline(breaking(), stages, INPUTS)
 
 
 def lost() -> Iterator[Record]:
@@ -306,38 +306,38 @@ def lost() -> Iterator[Record]:
 
 
 def test_an_odometry_that_is_no_pose_is_counted_and_its_frame_goes_through_without() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(lost(), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run = run_offline(lost(), stages, INPUTS)
     assert [frame.T_odom_camera is None for frame in chain.frames] == [False, True, False, False]
     assert (run.frames, run.dropped) == (4, {"malformed_odom": 1})
     assert "quaternion of non-zero length" in run.complaints["malformed_odom"]
 
 
 def test_a_bug_in_a_room_is_not_taken_for_a_broken_message() -> None:
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
 
     def fail(frame: object) -> None:
         raise ValueError("a bug")
 
     chain.process = fail  # type: ignore[method-assign, assignment]
     with pytest.raises(ValueError, match="a bug"):
-        run_offline(records(2), rooms, INPUTS)
+        run_offline(records(2), stages, INPUTS)
 
 
 def test_the_same_recording_gives_the_same_json() -> None:
     truth = Truth([(10**9, np.eye(4)), (11 * 10**8, np.eye(4))])
     texts = []
     for _ in range(2):
-        rooms, _ = simple_rooms()
-        summary = run_offline(records(4), rooms, INPUTS).summary(truth)
+        stages, _ = simple_rooms()
+        summary = run_offline(records(4), stages, INPUTS).summary(truth)
         assert set(summary.pop("stage_ms")) == {"decode", "detect", "segment", "check", "register"}
         texts.append(json.dumps(summary))
     assert texts[0] == texts[1]
 
 
 def test_the_json_has_the_keys_that_others_rely_on() -> None:
-    rooms, _ = simple_rooms()
-    summary = run_offline(records(4), rooms, INPUTS).summary(Truth([(10**9, np.eye(4)), (11 * 10**8, np.eye(4))]))
+    stages, _ = simple_rooms()
+    summary = run_offline(records(4), stages, INPUTS).summary(Truth([(10**9, np.eye(4)), (11 * 10**8, np.eye(4))]))
     wanted = {"frames", "detections", "objects", "constraints", "rejected", "stage_ms", "truth"}
     assert wanted <= set(summary)
     assert set(summary["constraints"][0]) == {
@@ -357,8 +357,8 @@ def test_the_json_has_the_keys_that_others_rely_on() -> None:
 
 
 def test_what_the_wire_rounds_is_rounded() -> None:
-    rooms, chain = simple_rooms()
-    run_offline(records(1), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run_offline(records(1), stages, INPUTS)
     frame = chain.frames[0]
     assert frame.objects[0].density == float(np.float32(0.1)) != 0.1
     again = as_sent(frame)
@@ -366,7 +366,7 @@ def test_what_the_wire_rounds_is_rounded() -> None:
 
 
 def test_points_go_through_the_organiser() -> None:
-    rooms, _ = simple_rooms()
+    stages, _ = simple_rooms()
     rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     rows["z"] = 2
     seen = []
@@ -376,18 +376,18 @@ def test_points_go_through_the_organiser() -> None:
         depth = np.ascontiguousarray(cloud.xyz[..., 2])
         return DepthImage(depth=depth, rgb=None, intrinsics=CAMERA, stamp_ns=cloud.stamp_ns)
 
-    object.__setattr__(rooms, "organise", organise)
+    object.__setattr__(stages, "organise", organise)
     clouds = [r for r in records(2) if r.topic != "/depth/image"]
     for stamp_ns in (10**9, 11 * 10**8):
         clouds.append(Record.of("/points", messages.point_cloud(rows, stamp_ns, "camera"), stamp_ns))
-    run = run_offline(clouds, rooms, Inputs(image="/image", points="/points", camera_info="/camera_info"))
+    run = run_offline(clouds, stages, Inputs(image="/image", points="/points", camera_info="/camera_info"))
     assert run.frames == 2 and seen[0].fx == CAMERA.fx
 
 
 @pytest.mark.parametrize(("height", "frames"), [(48, 2), (1, 0)])
 def test_a_camera_that_is_not_calibrated_stops_only_clouds_that_need_one(height: int, frames: int) -> None:
-    rooms, _ = simple_rooms()
-    object.__setattr__(rooms, "organise", organise)
+    stages, _ = simple_rooms()
+    object.__setattr__(stages, "organise", organise)
     xyz = back_project(1.5 + np.random.default_rng(1).random((48, 64)), 50.0, 50.0, 31.5, 23.5)
     rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     for axis, name in enumerate("xyz"):
@@ -397,14 +397,14 @@ def test_a_camera_that_is_not_calibrated_stops_only_clouds_that_need_one(height:
         cloud = messages.point_cloud(rows.reshape(height, -1), stamp_ns, "camera")
         said.append(uncalibrated(stamp_ns))
         said.append(Record.of("/points", cloud, stamp_ns))
-    run = run_offline(said, rooms, Inputs(image="/image", points="/points", camera_info="/camera_info"))
+    run = run_offline(said, stages, Inputs(image="/image", points="/points", camera_info="/camera_info"))
     assert run.frames == frames and run.dropped == ({} if frames else {"malformed_depth": 2})
     assert frames or "expected a calibrated K" in run.complaints["malformed_depth"]
 
 
 def test_the_json_tells_of_every_frame_and_every_refusal() -> None:
-    rooms, _ = simple_rooms()
-    run = run_offline(records(4), rooms, INPUTS)
+    stages, _ = simple_rooms()
+    run = run_offline(records(4), stages, INPUTS)
     summary = json.loads(json.dumps(run.summary(Truth([]))))
     assert [row["T_odom_camera"][0][3] for row in summary["glimpses"]] == pytest.approx([0, 0.1, 0.2, 0.3])
     assert summary["glimpses"][2]["labels"] == ["cup"]
@@ -412,8 +412,8 @@ def test_the_json_tells_of_every_frame_and_every_refusal() -> None:
 
 
 def test_the_json_tells_of_every_refusal() -> None:
-    rooms, _ = simple_rooms()
-    run = run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
+    stages, _ = simple_rooms()
+    run = run_offline(without("/odom", 1100 * MS), stages, INPUTS)
     expected = {"reason": "no_candidate", "from_ns": 1100 * MS, "to_ns": 1200 * MS, "detail": "no odometry"}
     assert run.summary(Truth([]))["refusals"][1] == expected | {"T_from_to": None, "evidence": {}}
 
@@ -430,15 +430,15 @@ def of_a_lens(frames: int, model: str = "plumb_bob", **names: str) -> Iterator[R
 
 def seen_of_a_lens(records: Iterator[Record], inputs: Inputs, rectified: str = "auto") -> tuple[Any, list[Any]]:
     """What a run gives, and the depth image and the box of each frame that reached the segmenter."""
-    rooms, _ = simple_rooms()
+    stages, _ = simple_rooms()
     met: list[Any] = []
 
     def segment(detections: Detections, depth: DepthImage, gravity: Any = None, **more: Any) -> Frame:
         met.append((depth, detections.xyxy))
-        return rooms.segmenter.segment(detections, depth, gravity, **more)
+        return stages.segmenter.segment(detections, depth, gravity, **more)
 
-    spied_segmenter = SimpleNamespace(segment=segment, choice=rooms.segmenter.choice, sensor=rooms.segmenter.sensor)
-    spied = replace(rooms, segmenter=spied_segmenter)
+    spied_segmenter = SimpleNamespace(segment=segment, choice=stages.segmenter.choice, sensor=stages.segmenter.sensor)
+    spied = replace(stages, segmenter=spied_segmenter)
     return run_offline(records, spied, inputs, Timing(rectified=rectified)), met
 
 
@@ -464,27 +464,27 @@ def test_pictures_whose_topics_say_that_they_are_rectified_reach_it_as_they_are(
 
 
 def test_frames_of_a_lens_that_nobody_knows_are_dropped_with_what_to_do() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(of_a_lens(3, "nobody's"), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run = run_offline(of_a_lens(3, "nobody's"), stages, INPUTS)
     assert chain.frames == [] and run.dropped == {"malformed_depth": 3}
     assert 'got "nobody\'s"; set segmenter.rectified to all' in run.complaints["malformed_depth"]
 
 
 def test_a_run_tells_what_its_frames_told_of_their_sensor() -> None:
-    rooms, _ = simple_rooms()
+    stages, _ = simple_rooms()
     sensor = SimpleNamespace(
         noise=1.234567, lag=Lag(24.0, 3.5), depth_to_colour=SimpleNamespace(text=lambda: "0.50 deg")
     )
-    told = SimpleNamespace(segment=rooms.segmenter.segment, choice=rooms.segmenter.choice, sensor=sensor)
-    summary = run_offline(records(2), replace(rooms, segmenter=told), INPUTS).summary(Truth([]))
+    told = SimpleNamespace(segment=stages.segmenter.segment, choice=stages.segmenter.choice, sensor=sensor)
+    summary = run_offline(records(2), replace(stages, segmenter=told), INPUTS).summary(Truth([]))
     assert summary["depth_noise"] == 1.235 and summary["depth_to_colour"] == "0.50 deg"
     assert summary["depth_lag"] == {"ms": 24.0, "sigma_ms": 3.5}
 
 
 def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
-    rooms, _ = simple_rooms()
-    told = SimpleNamespace(segment=rooms.segmenter.segment, choice=rooms.segmenter.choice, sensor=SensorEstimate())
-    summary = run_offline(records(2), replace(rooms, segmenter=told), INPUTS).summary(Truth([]))
+    stages, _ = simple_rooms()
+    told = SimpleNamespace(segment=stages.segmenter.segment, choice=stages.segmenter.choice, sensor=SensorEstimate())
+    summary = run_offline(records(2), replace(stages, segmenter=told), INPUTS).summary(Truth([]))
     assert summary["depth_noise"] is None and summary["depth_lag"] is None
 
 
@@ -497,8 +497,8 @@ def tied(place: np.ndarray, parent: str = "base", child: str = "camera") -> Timi
 
 def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames_unless_it_is_told() -> None:
     place = turned_about_x(0.3)
-    (rooms, chain), (told_rooms, told_chain) = simple_rooms(), simple_rooms()
-    run = run_offline(map(other_body, records(2)), rooms, INPUTS, tied(place))
+    (stages, chain), (told_rooms, told_chain) = simple_rooms(), simple_rooms()
+    run = run_offline(map(other_body, records(2)), stages, INPUTS, tied(place))
     told = replace(tied(np.eye(4)), T_base_camera=place)
     run_offline(map(other_body, records(2)), told_rooms, INPUTS, told)
     assert "/tf_static has the camera's 'camera' on the odometry's 'base'" in run.mount
@@ -510,8 +510,8 @@ def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames
 def test_gravity_of_a_level_odometry_is_turned_by_the_same_place() -> None:
     place = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
 
-    rooms, chain = simple_rooms()
-    run_offline(map(other_body, records(2)), rooms, INPUTS, replace(tied(place), level_odom=True))
+    stages, chain = simple_rooms()
+    run_offline(map(other_body, records(2)), stages, INPUTS, replace(tied(place), level_odom=True))
     for frame in chain.frames:
         np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-6)
 
@@ -529,15 +529,15 @@ def with_joint(recorded: list[Record], reaches: int) -> Iterator[Record]:
 
 
 def test_frames_wait_for_the_joint_that_carries_their_camera() -> None:
-    rooms, chain = simple_rooms()
-    run = run_offline(with_joint(list(records(4)), 4), rooms, INPUTS)
+    stages, chain = simple_rooms()
+    run = run_offline(with_joint(list(records(4)), 4), stages, INPUTS)
     angles = [rotation_angle(frame.T_odom_camera[:3, :3]) for frame in chain.frames]
     assert angles[1:] == pytest.approx([0.1, 0.2, 0.3], abs=1e-9) and "by a joint, which is followed" in run.mount
 
 
 def test_odometry_of_a_body_that_nothing_ties_to_the_camera_is_taken_as_the_cameras_and_said() -> None:
-    rooms, _ = simple_rooms()
-    run = run_offline(map(other_body, records(2)), rooms, INPUTS)
+    stages, _ = simple_rooms()
+    run = run_offline(map(other_body, records(2)), stages, INPUTS)
     assert "the registrar measures it" in run.mount
 
 
@@ -552,9 +552,9 @@ def test_what_the_masks_of_a_model_cover_is_the_objects(tmp_path: Path) -> None:
     pytest.importorskip("onnx")
     from detector.discs import require_objects, save_disc_model
 
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
     detector = Detector(DetectorParams(), save_disc_model(tmp_path / "m.onnx", (CAMERA.height, CAMERA.width)))
-    run_offline(records(2), replace(rooms, detector=detector, segmenter=Segmenter()), INPUTS)
+    run_offline(records(2), replace(stages, detector=detector, segmenter=Segmenter()), INPUTS)
     for frame in chain.frames:
         require_objects(CAMERA, frame.objects)
 
@@ -591,9 +591,9 @@ class InFrame:
 
 
 def test_depth_of_another_sensor_goes_to_the_segmenter_in_the_picture_of_colour() -> None:
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
     timing = tied(ASIDE, "rgb", "depth")
-    run = run_offline(of_two_sensors(), replace(rooms, detector=InFrame()), WITH_COLOUR, timing)
+    run = run_offline(of_two_sensors(), replace(stages, detector=InFrame()), WITH_COLOUR, timing)
     assert run.frames == 3 and not run.dropped
     assert run.summary(Truth([]))["registered"].startswith("depth of 'depth' is registered here to colour of 'rgb'")
     for frame in chain.frames:
@@ -607,14 +607,14 @@ def test_depth_of_another_sensor_goes_to_the_segmenter_in_the_picture_of_colour(
     [(WITH_COLOUR, "/tf_static between the two frames, got"), (INPUTS, "and the camera_info of colour, got")],
 )
 def test_depth_that_cannot_be_registered_is_dropped_with_what_is_missing(inputs: Inputs, lacks: str) -> None:
-    rooms, _ = simple_rooms()
-    run = run_offline(of_two_sensors(), replace(rooms, detector=InFrame()), inputs)
+    stages, _ = simple_rooms()
+    run = run_offline(of_two_sensors(), replace(stages, detector=InFrame()), inputs)
     assert run.frames == 0 and run.dropped == {"malformed_depth": 3}
     assert lacks in run.complaints["malformed_depth"] and "'rgb'" in run.complaints["malformed_depth"]
 
 
 def test_a_cloud_of_a_body_is_turned_into_the_frame_of_the_picture() -> None:
-    rooms, chain = simple_rooms()
+    stages, chain = simple_rooms()
     xyz = back_project(np.full((48, 64), 2.0, np.float32), CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
     R_body_optical = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
     rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
@@ -627,8 +627,8 @@ def test_a_cloud_of_a_body_is_turned_into_the_frame_of_the_picture() -> None:
     ]
     inputs = Inputs(image="/image", points="/points", odom="/odom")
     timing = tied(pose(R_body_optical.T, np.zeros(3)), "camera", "zed")
-    run = run_offline(said, replace(rooms, organise=organise), inputs, timing)
+    run = run_offline(said, replace(stages, organise=organise), inputs, timing)
     assert run.frames == 2 and not run.dropped
     np.testing.assert_allclose(chain.frames[0].view.xyz, xyz, atol=1e-5)
-    run = run_offline(said, replace(rooms, organise=organise), inputs)
+    run = run_offline(said, replace(stages, organise=organise), inputs)
     assert run.frames == 0 and "publish /tf_static between its frame" in run.complaints["malformed_depth"]

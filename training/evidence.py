@@ -22,7 +22,7 @@ from objreg_ros.data import Array
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose_error
-from objreg_ros.offline import Rooms, run_offline
+from objreg_ros.offline import Stages, run_offline
 from objreg_ros.recording import open_recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.registrar.registrar import Registrar
@@ -182,7 +182,7 @@ def gather(story: Told) -> Rows:
             registrar = Registrar(params, method=recorder, gate=recorder.judge)
             detecting = DetectorParams(model=share.EMBEDDED, threshold=THRESHOLD)
             detector = Detector(detecting, share.model(detecting.model))
-            stages = Rooms(detector, Segmenter(SegmenterParams()), registrar, organise)
+            stages = Stages(detector, Segmenter(SegmenterParams()), registrar, organise)
             run_offline(recording.records(set(inputs.chosen().values())), stages, inputs)
             registrar.finish()
             registrar.close()

@@ -34,7 +34,7 @@ class ToHydra(Adapter):
         super().__init__("objreg_to_hydra", ToHydraParams, BodyParams)
         self._robot = self.settings.of(ToHydraParams).robot
         self._body = Body(self)
-        self._graphs = self.create_publisher(PoseGraph, "external_loop_closures", qos.room(depth=100))
+        self._graphs = self.create_publisher(PoseGraph, "external_loop_closures", qos.stage(depth=100))
         self.listen_for_closures()
 
     def hand_over(self, closure: LoopClosure) -> bool:

@@ -29,7 +29,7 @@ class ToLioSam(Adapter):
         super().__init__("objreg_to_lio_sam", ToLioSamParams)
         self._pace = self.settings.of(ToLioSamParams)
         self._sent_at = -float("inf")
-        self._loops = self.create_publisher(Float64MultiArray, TOPIC, qos.room())
+        self._loops = self.create_publisher(Float64MultiArray, TOPIC, qos.stage())
         self.get_logger().info(
             f"pairs nearer than {self._pace.least_seconds:g} s are dropped, for LIO-SAM does; of others one goes every "
             f"{self._pace.period:g} s, for LIO-SAM keeps five and drops older ones"

@@ -65,7 +65,7 @@ class ToRtabmap(Adapter):
         self._wants_graph = True
         self._graph: Future | None = None
         self._graph_since = -math.inf  # when it was asked for
-        self.listen(MapData, "mapData", self._on_map, qos.room(depth=10))
+        self.listen(MapData, "mapData", self._on_map, qos.stage(depth=10))
         self.listen_for_closures()
 
     # What RTAB-Map and odometry send

@@ -24,7 +24,7 @@ LIFE_CYCLE = (
     *("~/get_available_transitions", "~/get_transition_graph"),
 )
 LOG = ("/rosout", "/parameter_events")
-ROOMS = ("detector", "segmenter", "registrar", "keyframer", "mapper")
+STAGES = ("detector", "segmenter", "registrar", "keyframer", "mapper")
 
 
 @dataclass(frozen=True)

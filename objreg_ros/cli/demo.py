@@ -17,7 +17,7 @@ from objreg_ros import share
 from objreg_ros.bridge.camera.calibration import absolute
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.cli import live_table, options
-from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
+from objreg_ros.cli.live import STAGES, Live, Setup, run_live
 from objreg_ros.cli.paths import OutputPath, RecordingPath
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.run_output import closing_lines, exit_code, print_reasons, tell
@@ -36,7 +36,7 @@ from objreg_ros.recording.troubles import FOLDER, troubles
 from objreg_ros.registration.params import RegistrarNodeParams
 from objreg_ros.report.run.about import about
 from objreg_ros.report.run.findings import as_json, find, setting
-from objreg_ros.report.run.live_pictures import draw_sight, draw_way
+from objreg_ros.report.run.live_pictures import draw_sight, draw_trajectory
 from objreg_ros.report.write import write_report
 from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_ros.truth import Truth, summarise
@@ -170,13 +170,13 @@ def _say(text: str) -> None:
 def setup_of(asked: Asked, inputs: Inputs, camera: str = "") -> Setup:
     """The arguments of the nodes and of the player, which plays just these inputs, with the ``camera`` if given."""
     everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
-    node_args = {node: list(everywhere) for node in ROOMS}
+    node_args = {node: list(everywhere) for node in STAGES}
     named = {"model": asked.model, "labels": asked.labels}
-    changes = [f"{node}.reliable=true" for node in ROOMS if asked.lossless]
+    changes = [f"{node}.reliable=true" for node in STAGES if asked.lossless]
     changes += [*(f"detector.{name}={value}" for name, value in named.items() if value), *asked.changes]
     for node, name, value in map(parse_change, changes):
-        if node not in ROOMS:
-            raise ValueError(f"--set: expected a node of the demo ({', '.join(ROOMS)}), got {node}; leave it out")
+        if node not in STAGES:
+            raise ValueError(f"--set: expected a node of the demo ({', '.join(STAGES)}), got {node}; leave it out")
         node_args[node] += _override(node, ros_argument(name, value))
     replay = ["--lossless"] if asked.lossless else ["--rate", str(asked.rate)]
     replay += ["--camera", camera] if camera else []
@@ -245,15 +245,15 @@ def summary_of(told: Mapping[str, Any], live: Live, truth: Truth) -> dict[str, A
 def _draw(out: Path, live: Live, truth: Truth, source: Recording, inputs: Inputs) -> None:
     if truth.poses:
         try:
-            draw_way(out / "way.png", truth, live.closures)
-            _say(f"drew {out / 'way.png'}")
+            draw_trajectory(out / "trajectory.png", truth, live.closures)
+            _say(f"drew {out / 'trajectory.png'}")
         except ModuleNotFoundError as absent:  # an extra that a robot does without
-            _say(f"did not draw {out / 'way.png'}: {absent}")
+            _say(f"did not draw {out / 'trajectory.png'}: {absent}")
     image = None if live.sight is None else _image(source, inputs, live.sight.detections.stamp_ns)
     camera = camera_of(source, inputs)
     if live.sight is not None and image is not None and camera is not None:
-        draw_sight(out / "sight.png", image.rgb, camera, live.sight.detections, live.sight.objects)
-        _say(f"drew {out / 'sight.png'}")
+        draw_sight(out / "detections.png", image.rgb, camera, live.sight.detections, live.sight.objects)
+        _say(f"drew {out / 'detections.png'}")
 
 
 def camera_of(source: Recording, inputs: Inputs) -> Intrinsics | None:

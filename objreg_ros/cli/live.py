@@ -20,7 +20,7 @@ from objreg_ros.data import LoopClosure, Rejected
 if TYPE_CHECKING:
     from objreg_ros.bridge.streams.collector import Collector, Sight
 
-ROOMS = ("detector", "segmenter", "registrar")
+STAGES = ("detector", "segmenter", "registrar")
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
 DRAIN_S = 120.0  # the last searches
 QUIET_S = 3.0  # no counter moved for so long: all is through
@@ -70,9 +70,9 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
 
 def _programs(setup: Setup) -> list[tuple[str, str, list[str]]]:
     """The processes to start: the name of the log, the module and the arguments of each."""
-    arguments = {node: list(setup.node_args.get(node, ())) for node in ROOMS}
+    arguments = {node: list(setup.node_args.get(node, ())) for node in STAGES}
     if setup.composed:
-        own = [_addressed(node, argument) for node in ROOMS for argument in arguments[node]]
+        own = [_addressed(node, argument) for node in STAGES for argument in arguments[node]]
         return [("graph", "objreg_ros.graph", ["--ros-args", *own] if own else [])]
     return [(node, f"objreg_ros.{node}.node", ["--ros-args", *own] if own else []) for node, own in arguments.items()]
 
@@ -114,11 +114,11 @@ def _listening(environment: Mapping[str, str]) -> Iterator[Collector]:
 def _wait_for_nodes(collector: Collector, processes: Processes) -> None:
     def there() -> bool:
         processes.require_alive()
-        return {f"/{node}" for node in ROOMS} <= set(collector.counters)
+        return {f"/{node}" for node in STAGES} <= set(collector.counters)
 
     if not collector.spin_until(there, START_S):
         raise ValueError(
-            f"expected {', '.join(ROOMS)} to report within {START_S:.0f} s, got {sorted(collector.counters)}"
+            f"expected {', '.join(STAGES)} to report within {START_S:.0f} s, got {sorted(collector.counters)}"
         )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from objreg_ros.bridge.node.accounting import Balance
-from objreg_ros.cli.live import ROOMS, Live
+from objreg_ros.cli.live import STAGES, Live
 
 
 def lines(live: Live, sent: Mapping[str, int], truth: Mapping[str, Any]) -> Iterator[str]:
@@ -16,11 +16,11 @@ def lines(live: Live, sent: Mapping[str, int], truth: Mapping[str, Any]) -> Iter
     ``sent`` is how many frames were sent to each node, ``truth`` as `objreg_ros.truth.summarise` gives it.
     """
     yield f"{'frames':<12}{'sent':>7}{'in':>7}{'out':>7}{'waiting':>9}  dropped"
-    for node in ROOMS:
+    for node in STAGES:
         yield _frames(node, sent[node], live.counters[node])
     yield ""
     yield f"{'latency':<12}{'stage':<12}{'p50 ms':>9}{'p95 ms':>9}"
-    for node in ROOMS:
+    for node in STAGES:
         yield from _latencies(node, live.counters[node])
     yield ""
     yield f"constraints: {len(live.closures)}"
@@ -57,7 +57,7 @@ def _errors(truth: Mapping[str, Any]) -> str:
 
 def require_balance(live: Live, sent: Mapping[str, int]) -> None:
     """ValueError if a node received more than was sent to it, or if in is not out + waiting + dropped."""
-    for node in ROOMS:
+    for node in STAGES:
         counters = live.counters[node]
         ended = counters.published + counters.waiting + sum(counters.dropped.values())
         if counters.received != ended or counters.received > sent[node]:

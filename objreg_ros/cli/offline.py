@@ -70,7 +70,7 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
     outputs = Outputs.of(**given)
     tell_ignored(asked.settings)
     with asked.opened(recording) as opened, TemporaryDirectory() as folder, json_to(json_file) as write_json:
-        outputs.require_way(opened.source, opened.odometry is not None, bool(opened.truth.poses))
+        outputs.require_trajectory(opened.source, opened.odometry is not None, bool(opened.truth.poses))
         for note in opened.notes:
             click.echo(f"! {note}", err=True)
         registrar = outputs.remembering(asked.settings.of("registrar", RegistrarParams), folder)

@@ -48,18 +48,18 @@ class Outputs:
         """Whether any file is asked for."""
         return bool(self.files.wanted or self.scenes.wanted)
 
-    def require_way(self, source: Recording, has_way: bool, has_truth: bool) -> None:
+    def require_trajectory(self, source: Recording, has_trajectory: bool, has_truth: bool) -> None:
         """ValueError where nothing will give the trajectory: a map corrects one, a scene shows any.
 
-        ``has_way`` is whether there is odometry, or the registrar's own tracking in its place.
+        ``has_trajectory`` is whether there is odometry, or the registrar's own tracking in its place.
         """
-        if self.files.wanted and not has_way:
+        if self.files.wanted and not has_trajectory:
             there = ", ".join(source.topics)
             raise ValueError(
                 f"{source.path}: {', '.join(self.files.wanted)}: expected a trajectory, which a map corrects, got "
                 f"--odometry none; leave it out or take --odometry tracked, or one of {there} with --odometry TOPIC"
             )
-        self.scenes.require_way(source.path, has_way or has_truth)
+        self.scenes.require_trajectory(source.path, has_trajectory or has_truth)
 
     def remembering(self, registrar: RegistrarParams, folder: str) -> RegistrarParams:
         """With a store in a file, in ``folder`` unless it has one, where the map is made of its keyframes."""

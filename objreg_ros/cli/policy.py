@@ -115,10 +115,10 @@ def policy_text(asked: Asked) -> str:
 def enclaves_of(asked: Asked) -> dict[str, dict[str, Access]]:
     """What each node of each enclave may do. Names are those that the nodes give, behind remaps."""
     nodes = asked.nodes()
-    sources = access.of_sources(access.NODES[name] for name in access.ROOMS).renamed(asked.remaps)
+    sources = access.of_sources(access.NODES[name] for name in access.STAGES).renamed(asked.remaps)
     return {
         **{name: {name: allowed} for name, allowed in nodes.items()},
-        GRAPH: {name: nodes[name] for name in access.ROOMS},
+        GRAPH: {name: nodes[name] for name in access.STAGES},
         SOURCES: dict.fromkeys(asked.sources, sources),
         OPERATOR: {OPERATOR: _operator(asked, nodes)},
     }

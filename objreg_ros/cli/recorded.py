@@ -14,7 +14,7 @@ import numpy as np
 from objreg_ros.bridge.camera.calibration import absolute
 from objreg_ros.cli.settings import Settings, read_settings
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.offline import Detects, Run, Timing, build_rooms, run_offline
+from objreg_ros.offline import Detects, Run, Timing, build_stages, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.camera_from_text import with_camera
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
@@ -172,7 +172,7 @@ class Opened:
         detector = settings.of("detector", DetectorParams)
         frames = frame_tree(self.source, camera_frame(self.source, self.inputs))
         timing = replace(self._timing(), frames=frames, max_rate=detector.max_rate)
-        stages, close = build_rooms(
+        stages, close = build_stages(
             detector,
             settings.of("segmenter", SegmenterParams),
             registrar or settings.of("registrar", RegistrarParams),

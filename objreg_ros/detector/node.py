@@ -43,9 +43,9 @@ class DetectorNode(NodeBase):
         self._detector = Detector.of(params, share.model)
         self._pace, self._turns = Pace(params.max_rate), Turns(self._leave_out)
         self._names = dict(enumerate(self._detector.labels))
-        self._table = self.offer(PointCloud2, "detections_table", qos.room())
+        self._table = self.offer(PointCloud2, "detections_table", qos.stage())
         array = vision_to_msg.Detection2DArray
-        self._array = None if array is None else self.create_publisher(array, "detections", qos.room())
+        self._array = None if array is None else self.create_publisher(array, "detections", qos.stage())
         self._labels = self.create_publisher(String, "labels", qos.latched())
         self._labels.publish(to_msg.labels(self._names))
         for topic in IMAGES:  # the next node does not decode again what this one has decoded
@@ -74,7 +74,7 @@ class DetectorNode(NodeBase):
         """Report a surplus image, after the tables of those before it."""
         surplus = Surplus(stamp_ns, frame_id)
         self._hand_over_picture(surplus)
-        self._table.tell(surplus, partial(to_msg.surplus, *surplus))
+        self._table.publish(surplus, partial(to_msg.surplus, *surplus))
         self.leave_out(stamp_ns, Drop.SURPLUS.value)
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
@@ -92,7 +92,7 @@ class DetectorNode(NodeBase):
         self._hand_over_picture(image)
         with self.accounting.timed("detect"):
             detections = self._detector.detect(image)
-        self._table.tell(detections, partial(to_msg.detections_table, detections, self._names))
+        self._table.publish(detections, partial(to_msg.detections_table, detections, self._names))
         if self._array is not None and self._array.get_subscription_count():
             self._array.publish(vision_to_msg.detections(detections))
         return True

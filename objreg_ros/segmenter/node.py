@@ -76,12 +76,12 @@ class SegmenterNode(SynchronisedNode):
         self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by
         self._lens = self._registered = ""  # the last messages on the lens, and on the registration of depth
-        self._objects = self.offer(PointCloud2, "objects", qos.room())
-        self._view = self.create_publisher(PointCloud2, "view", qos.room())
-        self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.room())
-        self._gravity = self.create_publisher(Vector3Stamped, "gravity", qos.room())
+        self._objects = self.offer(PointCloud2, "objects", qos.stage())
+        self._view = self.create_publisher(PointCloud2, "view", qos.stage())
+        self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.stage())
+        self._gravity = self.create_publisher(Vector3Stamped, "gravity", qos.stage())
         solids = vision_to_msg.Detection3DArray
-        self._solids = None if solids is None else self.create_publisher(solids, "detections_3d", qos.room())
+        self._solids = None if solids is None else self.create_publisher(solids, "detections_3d", qos.stage())
         self._listen()
 
     def _warm(self) -> None:
@@ -318,7 +318,7 @@ class SegmenterNode(SynchronisedNode):
             return colour_frame.Seen(organise(cloud, camera), camera_info, raw), cloud
 
     def _publish(self, frame: Frame, names: to_msg.Labels) -> None:
-        self._objects.tell(frame, partial(to_msg.objects, frame, names))
+        self._objects.publish(frame, partial(to_msg.objects, frame, names))
         if self._solids is not None and self._solids.get_subscription_count():
             self._solids.publish(vision_to_msg.objects(frame))
         parts = {self._view: to_msg.view, self._view_info: to_msg.view_camera_info, self._gravity: to_msg.gravity}

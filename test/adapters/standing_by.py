@@ -49,7 +49,7 @@ class Around:
         self.executor.add_node(self.node)
         self.nodes: list[Adapter] = []
         self.constraints = self.node.create_publisher(OdometryMsg, "constraints", qos.latched(100))
-        self.odom = self.node.create_publisher(OdometryMsg, "odom", qos.room(1000))
+        self.odom = self.node.create_publisher(OdometryMsg, "odom", qos.stage(1000))
         self.whole: Any = None
         if closures_msg.LoopClosureMsg is not None:
             self.whole = self.node.create_publisher(closures_msg.LoopClosureMsg, "loop_closures", qos.latched(100))

@@ -32,7 +32,7 @@ def test_an_edge_between_bodies_arrives_field_by_field_once_hydra_listens(around
     graph.send(closure())
     graph.wait(lambda: node.accounting.balance().waiting == 1)
     received: list[Any] = []
-    graph.node.create_subscription(hydra.PoseGraph, "external_loop_closures", received.append, qos.room())
+    graph.node.create_subscription(hydra.PoseGraph, "external_loop_closures", received.append, qos.stage())
     graph.wait(lambda: received)
     (edge,) = received[0].edges
     assert (edge.key_from, edge.key_to, edge.type) == (1_500_000_000, 63_250_000_000, edge.LOOPCLOSE)

@@ -24,4 +24,4 @@ def test_a_pair_of_different_rooms_is_refused_with_a_reason() -> None:
 
     strangers._begin([[keyframe(1, 1, (CUP,))], [keyframe(2, 2, (CHAIR,))]])
     ((reason, _),) = strangers.tried([(0, 0, 1, 0)])
-    assert reason == "few_objects_explained"  # the same walls, and a chair in the stead of the cup
+    assert reason == "few_objects_matched"  # the same walls, and a chair in the stead of the cup

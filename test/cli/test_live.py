@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.bridge.node.accounting import Balance
-from objreg_ros.cli.live import ROOMS, Live, Setup, private_environment, run_live
+from objreg_ros.cli.live import STAGES, Live, Setup, private_environment, run_live
 from objreg_ros.data import LoopClosure, Reason, Rejected
 
 BAG = Path("some/bag")
@@ -114,7 +114,7 @@ class Stage:
 def stage(monkeypatch: pytest.MonkeyPatch) -> Stage:
     """A stage on which all nodes report after a second, and whose player ends at once."""
     made = Stage()
-    made.events = [(1.0, made.reports(**dict.fromkeys(ROOMS, counters(0)))), (1.0, made.ends)]
+    made.events = [(1.0, made.reports(**dict.fromkeys(STAGES, counters(0)))), (1.0, made.ends)]
     monkeypatch.setattr("objreg_ros.cli.live.Processes", made.processes)
     monkeypatch.setattr("rclpy.context.Context", lambda: made)
     monkeypatch.setattr("objreg_ros.bridge.streams.collector.Collector", lambda context: made)
@@ -137,7 +137,7 @@ def test_what_was_collected_comes_back_with_bare_names_and_in_order_of_time(stag
     stage.glimpses = {k: {"stamp_ns": k} for k in (9, 4, 6)}
     stage.closures, stage.refusals = [CLOSURE], [REFUSAL]
     live = stage.run()
-    assert live.counters == dict.fromkeys(ROOMS, counters(0)) and live.rejected == {"no_candidate": 1}
+    assert live.counters == dict.fromkeys(STAGES, counters(0)) and live.rejected == {"no_candidate": 1}
     assert [glimpse["stamp_ns"] for glimpse in live.glimpses] == [4, 6, 9]
     assert (live.closures, live.refusals, live.sight) == ((CLOSURE,), (REFUSAL,), None)
 

@@ -33,16 +33,16 @@ def test_a_voxel_that_is_none_is_refused_by_the_name_of_its_option(tmp_path: Pat
 
 
 def test_a_map_wants_a_trajectory_and_says_how_to_get_one(tmp_path: Path) -> None:
-    asked(tmp_path, "tum").require_way(BAG, has_way=True, has_truth=False)
+    asked(tmp_path, "tum").require_trajectory(BAG, has_trajectory=True, has_truth=False)
     with pytest.raises(ValueError, match=r"--tum: expected a trajectory.*--odometry none.*--odometry tracked"):
-        asked(tmp_path, "tum").require_way(BAG, has_way=False, has_truth=True)
+        asked(tmp_path, "tum").require_trajectory(BAG, has_trajectory=False, has_truth=True)
 
 
 def test_a_scene_is_content_with_truth(tmp_path: Path) -> None:
     outputs = asked(tmp_path, "mcap")
-    outputs.require_way(BAG, has_way=False, has_truth=True)
+    outputs.require_trajectory(BAG, has_trajectory=False, has_truth=True)
     with pytest.raises(ValueError, match="--mcap: expected odometry or a ground truth"):
-        outputs.require_way(BAG, has_way=False, has_truth=False)
+        outputs.require_trajectory(BAG, has_trajectory=False, has_truth=False)
 
 
 def test_a_cloud_is_made_of_a_store_in_a_file(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from objreg_ros.cli.simulate import camera_of, sensors_of
 from objreg_ros.data import ColourImage, Detections, Rejected
-from objreg_ros.offline import Detects, Rooms, Run, run_offline
+from objreg_ros.offline import Detects, Run, Stages, run_offline
 from objreg_ros.recording import open_recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.registrar.registrar import Registrar
@@ -94,9 +94,9 @@ def run(path: Path, detector: Detects, frames: int, progress: Progress = lambda 
     try:
         with open_recording(path) as recording:
             inputs = choose_inputs(recording.topics)
-            rooms = Rooms(detector, Segmenter(SegmenterParams()), registrar, organise)
+            stages = Stages(detector, Segmenter(SegmenterParams()), registrar, organise)
             records = recording.records(set(inputs.chosen().values()))
-            return run_offline(records, rooms, inputs, max_frames=frames, on_frame=progress)
+            return run_offline(records, stages, inputs, max_frames=frames, on_frame=progress)
     finally:
         registrar.close()
 

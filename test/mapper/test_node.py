@@ -45,7 +45,7 @@ class Outside:
         self.peer = rclpy.create_node("outside")
         self.paths: list[Any] = []
         self.corrections: list[Any] = []
-        self.odom = self.peer.create_publisher(OdometryMsg, "odom", qos.room(1000))
+        self.odom = self.peer.create_publisher(OdometryMsg, "odom", qos.stage(1000))
         self.constraints = self.peer.create_publisher(OdometryMsg, "constraints", qos.latched(100))
         self.peer.create_subscription(PathMsg, "path", self.paths.append, qos.latched())
         self.peer.create_subscription(TransformStamped, "correction", self.corrections.append, qos.latched())

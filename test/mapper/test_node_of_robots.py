@@ -50,7 +50,7 @@ class Fleet:
         self.corrections: dict[str, list[Any]] = {"a": [], "b": []}
         self.odom = {}
         for robot in "ab":
-            self.odom[robot] = self.peer.create_publisher(OdometryMsg, f"{robot}/odom", qos.room(1000))
+            self.odom[robot] = self.peer.create_publisher(OdometryMsg, f"{robot}/odom", qos.stage(1000))
             self.peer.create_subscription(PathMsg, f"{robot}/path", self.paths[robot].append, qos.latched())
             received = self.corrections[robot].append
             self.peer.create_subscription(TransformStamped, f"{robot}/correction", received, qos.latched())

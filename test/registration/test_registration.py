@@ -48,7 +48,7 @@ def test_a_place_seen_again_is_accepted_with_pose_covariance_and_evidence() -> N
     degrees, cm = pose_error(found.T_1_2, inverse(seen_from(20.0)) @ seen_from(0.0))
     assert degrees < 1.0 and cm < 2.0
     assert np.linalg.eigvalsh(found.covariance).min() > 0
-    assert found.evidence["score"] > 0 and found.evidence["explained"] >= 1
+    assert found.evidence["score"] > 0 and found.evidence["matched"] >= 1
 
 
 def test_without_a_candidate_the_reason_says_so_and_there_is_nothing_else() -> None:

@@ -47,7 +47,7 @@ class Graph:
         self.counters: dict[str, Balance] = {}
         self.connected: dict[str, dict[str, int]] = {}
         self.status: dict[str, DiagnosticStatus] = {}  # of each node, the last
-        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._take_books, qos.room())
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._take_books, qos.stage())
 
     # Processes
 
@@ -115,12 +115,12 @@ class Graph:
 
     def receive(self, kind: type, topic: str, profile: Any = None) -> None:
         """Collect the messages of a topic in ``received``."""
-        self.node.create_subscription(kind, topic, self.received[topic].append, profile or qos.room(depth=1000))
+        self.node.create_subscription(kind, topic, self.received[topic].append, profile or qos.stage(depth=1000))
 
     def publish(self, topic: str, message: Any, listeners: int = 1) -> None:
         """Publish once the nodes listen: each end of a connection has to know of the other."""
         if topic not in self.publishers:
-            reliable = qos.latched() if topic.endswith(("labels", "label_info", "constraints")) else qos.room()
+            reliable = qos.latched() if topic.endswith(("labels", "label_info", "constraints")) else qos.stage()
             publisher = self.publishers[topic] = self.node.create_publisher(type(message), topic, reliable)
 
             def there() -> bool:

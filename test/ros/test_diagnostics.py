@@ -54,7 +54,7 @@ def see_until(graph: Graph, encoding: str, level: bytes, stamp_ns: int) -> int:
 
 def test_an_override_makes_a_subscription_reliable(running: Graph) -> None:
     (info,) = running.node.get_subscriptions_info_by_topic("/image")
-    assert info.qos_profile.reliability == qos.room().reliability
+    assert info.qos_profile.reliability == qos.stage().reliability
     (info,) = running.node.get_subscriptions_info_by_topic("/image/compressed")
     assert info.qos_profile.reliability == qos.sensor(False).reliability
 

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.ros
 
 SHARED = Path(os.environ.get("OBJREG_SHARED", REPOSITORY.parent / "shared"))
 KITCHEN, COCO = SHARED / "data" / "redkitchen_a", SHARED / "models" / "ssd_mobilenet_v1_coco_int8.onnx"
-ROOMS = ("detector", "segmenter", "registrar")
+STAGES = ("detector", "segmenter", "registrar")
 WIRE = {"objects": PointCloud2, "view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
 
 
@@ -78,8 +78,10 @@ def test_every_frame_passes_three_nodes_and_every_node_balances_its_books(
     running.wait_for(lambda: connected(running), START_S, "the rooms to find each other")
     for moment in moments:
         feed(running, moment)
-        assert [running.answer(room, moment.stamp_ns) for room in ROOMS] == ["published"] * 3, running.log("/registrar")
-    for room in ROOMS:
+        assert [running.answer(room, moment.stamp_ns) for room in STAGES] == ["published"] * 3, running.log(
+            "/registrar"
+        )
+    for room in STAGES:
         counters = running.balance(f"/{room}", received=len(moments))
         assert (counters.published, counters.dropped, counters.lost) == (len(moments), {}, {}), room
     stamps = [moment.stamp_ns for moment in moments]
@@ -93,7 +95,7 @@ def test_a_jump_back_in_time_goes_on_like_a_looped_bag(running: Graph, moments: 
     for moment in moments[:3]:
         running.received["finished"].clear()
         feed(running, moment)
-        assert [running.answer(room, moment.stamp_ns) for room in ROOMS] == ["published"] * 3
+        assert [running.answer(room, moment.stamp_ns) for room in STAGES] == ["published"] * 3
     assert len(running.received["objects"]) == before + 3
 
 
@@ -126,4 +128,4 @@ def test_a_late_subscriber_still_gets_the_labels(running: Graph) -> None:
 
 
 def test_an_interrupt_ends_every_node_with_status_0(running: Graph) -> None:
-    assert {name: running.stop(name) for name in list(running.processes)} == {f"/{room}": 0 for room in ROOMS}
+    assert {name: running.stop(name) for name in list(running.processes)} == {f"/{room}": 0 for room in STAGES}

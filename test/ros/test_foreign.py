@@ -29,7 +29,7 @@ from .moments import Moment, recorded
 pytestmark = pytest.mark.ros
 
 FRAMES, RATE_HZ = 14, 2.0
-ROOMS = ("segmenter", "registrar")
+STAGES = ("segmenter", "registrar")
 Told = Callable[[Truth, TrueFrame], dict[str, Any]]  # a frame → messages by topic
 
 
@@ -98,7 +98,7 @@ def closures(graph: Graph, path: Path, told: Told, **first: Any) -> list[LoopClo
         frame = truth.frame(moment.stamp_ns)
         assert frame is not None
         feed(graph, moment, {**told(truth, frame), "odom": odometry(frame)})
-        assert [graph.answer(room, moment.stamp_ns) for room in ROOMS] == ["published"] * 2, graph.log("segmenter")
+        assert [graph.answer(room, moment.stamp_ns) for room in STAGES] == ["published"] * 2, graph.log("segmenter")
     client = graph.node.create_client(Trigger, "registrar/save")
     graph.wait_for(client.service_is_ready, START_S, "the registrar's service")
     saved = client.call_async(Trigger.Request())

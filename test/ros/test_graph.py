@@ -21,7 +21,7 @@ from .graph import START_S, Graph
 from .test_replay import await_release, end_keyframe, objreg, start
 
 pytestmark = pytest.mark.ros
-ROOMS = ("detector", "segmenter", "registrar")
+STAGES = ("detector", "segmenter", "registrar")
 LOSSLESS = ("--lossless", "--wait", str(START_S), "--patience", "60")
 
 
@@ -43,7 +43,7 @@ def test_a_lossless_replay_brings_every_frame_through_one_process(
     compose(fresh, tiny_model)
     folder = tum_folder(tmp_path / "tum", frames=12)
     output = objreg(fresh, "replay", str(folder), *LOSSLESS)
-    for room in ROOMS:
+    for room in STAGES:
         assert f"{room}: 12 published\n" in output
         counters = fresh.balance(f"/{room}", received=12)
         assert (counters.published, counters.dropped, counters.lost) == (12, {}, {})

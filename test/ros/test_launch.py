@@ -58,7 +58,7 @@ def replayed(repository: Path, said: dict[str, Any]) -> Callable[..., list[str]]
 
 def test_without_arguments_no_parameter_is_set_and_nothing_is_remapped(repository: Path, said: dict[str, Any]) -> None:
     file = launch_file(repository)
-    assert file["_remappings"](said) == [] and all(file["_parameters"](room, said) == [] for room in file["ROOMS"])
+    assert file["_remappings"](said) == [] and all(file["_parameters"](room, said) == [] for room in file["STAGES"])
 
 
 def test_the_mapper_comes_along_when_it_is_asked_for(repository: Path, said: dict[str, Any]) -> None:
@@ -82,13 +82,13 @@ def test_our_detector_stays_at_home_where_another_one_speaks(
 def test_the_nodes_of_one_process_each_get_their_own_parameters(repository: Path, said: dict[str, Any]) -> None:
     file = launch_file(repository)
     given = {**said, "model": "my.onnx", "source": "points", "params_file": "my.yaml"}
-    users, ours = file["_shared"](file["ROOMS"], given)
+    users, ours = file["_shared"](file["STAGES"], given)
     told = json.loads(Path(ours).read_text())
     assert users == "my.yaml" and told == {
         "/**/detector": {"ros__parameters": {"model": "my.onnx"}},
         "/**/segmenter": {"ros__parameters": {"source": "points"}},
     }
-    assert file["_shared"](file["ROOMS"], said) == []
+    assert file["_shared"](file["STAGES"], said) == []
 
 
 def test_rviz_gets_the_namespace_and_the_topics_of_the_nodes(repository: Path, said: dict[str, Any]) -> None:

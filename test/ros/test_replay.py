@@ -27,7 +27,7 @@ from objreg_ros.bridge.node.diagnostics import refusal_of
 from .graph import START_S, Graph
 
 pytestmark = pytest.mark.ros
-ROOMS = ("detector", "segmenter", "registrar")
+STAGES = ("detector", "segmenter", "registrar")
 QUIET_S = 1.0  # without another message
 
 
@@ -62,7 +62,7 @@ def test_a_lossless_replay_brings_every_frame_through_every_node(
     folder = tum_folder(tmp_path / "tum", frames=12)
     output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S), "--patience", "60")
     assert "12 image" in output
-    for room in ROOMS:
+    for room in STAGES:
         assert f"{room}: 12 published\n" in output
         counters = fresh.balance(f"/{room}", received=12)
         assert (counters.published, counters.dropped, counters.lost) == (12, {}, {})

@@ -100,7 +100,7 @@ def test_keyframes_of_two_robots_close_loops_in_one_registrar_and_tie_them_in_on
         fleet.receive(TransformStamped, f"{robot}/correction", qos.latched())
         fleet.start(f"{robot}/keyframer", "keyframes", f"-r __ns:=/{robot}", "-p reliable:=true", MOUNT)
     fleet.receive(OdometryMsg, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
-    fleet.receive(DiagnosticArray, "refusals", qos.room(depth=100))
+    fleet.receive(DiagnosticArray, "refusals", qos.stage(depth=100))
     fleet.start("registrar", "registrar", "-p robots:=[r1, r2]", f"-p store:={store}")
     fleet.start("mapper", "mapper", "-p robots:=[r1, r2]", "-p publish_tf:=false", MOUNT)
     drive(fleet, "r1", 100)

@@ -33,13 +33,13 @@ class Camera:
 
     def __init__(self, kept: bool, distortion: tuple[float, ...] = (), model: str = "plumb_bob") -> None:
         self.peer = rclpy.create_node("camera")
-        self.info = self.peer.create_publisher(CameraInfo, "camera_info", qos.latched() if kept else qos.room())
+        self.info = self.peer.create_publisher(CameraInfo, "camera_info", qos.latched() if kept else qos.stage())
         told = to_msg.camera_info(CAMERA, 1, "eye")
         if distortion:
             told.d, told.distortion_model = list(distortion), model
         self.info.publish(told)
-        self.depth = self.peer.create_publisher(Image, "depth/image", qos.room())
-        self.table = self.peer.create_publisher(PointCloud2, "detections_table", qos.room())
+        self.depth = self.peer.create_publisher(Image, "depth/image", qos.stage())
+        self.table = self.peer.create_publisher(PointCloud2, "detections_table", qos.stage())
         self.labels = self.peer.create_publisher(String, "labels", qos.latched())
         self.labels.publish(to_msg.labels(NAMES))
         self.said: list[str] = []
@@ -132,7 +132,7 @@ def test_depth_of_another_sensor_is_brought_into_the_picture_of_colour(
     T_colour_depth[0, 3] = -0.12
     camera.node._find_pose = lambda a, b: T_colour_depth if (a, b) == ("colour_eye", "depth_eye") else None
     of_colour = replace(CAMERA, fx=600.0, fy=600.0, cx=319.5, cy=239.5, width=640, height=480)
-    info = camera.peer.create_publisher(CameraInfo, "colour/camera_info", qos.room())
+    info = camera.peer.create_publisher(CameraInfo, "colour/camera_info", qos.stage())
     camera.wait(lambda: info.get_subscription_count() > 0)
     info.publish(to_msg.camera_info(of_colour, 1, "colour_eye"))
     camera.wait(lambda: camera.node._colour_info is not None)

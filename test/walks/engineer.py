@@ -15,7 +15,7 @@ from objreg_ros.bridge.node.diagnostics import refusal_of
 
 from .walk import PATIENCE_S, Walk
 
-ROOMS = ("detector", "segmenter", "registrar")
+STAGES = ("detector", "segmenter", "registrar")
 FRAMES = 17  # of the first 15 s of the room
 ROBOT = "/fleet/robot_7"
 DRIVER = {"image": "/kinect/rgb/raw", "depth/image": "/kinect/depth/raw", "camera_info": "/kinect/info"}
@@ -25,7 +25,7 @@ BEHIND = ["--", "--ros-args", *(word for rule in RULES for word in rule.split(" 
 
 def walk(graph: Graph, folder: Path, room: Path) -> None:
     """Start, play, receive: constraints, refusals, and counters that balance."""
-    for name in ROOMS:
+    for name in STAGES:
         graph.start(f"{ROBOT}/{name}", name, *RULES, *(["-p reliable:=true"] if name != "registrar" else []))
     graph.receive(Odometry, f"{ROBOT}/constraints", qos.latched(depth=1000))
     graph.receive(DiagnosticArray, f"{ROBOT}/refusals")
@@ -34,7 +34,7 @@ def walk(graph: Graph, folder: Path, room: Path) -> None:
     engineer = Walk(folder)
     _play_where_nobody_listens(engineer, room)
     played = engineer.type("replay", str(room), "--lossless", "--end", "15", "--wait", str(PATIENCE_S), *BEHIND)
-    assert all(f"{room}: {FRAMES} published" in played.text for room in ROOMS), played.text
+    assert all(f"{room}: {FRAMES} published" in played.text for room in STAGES), played.text
 
     graph.wait_for(lambda: bool(graph.received[f"{ROBOT}/constraints"]), what="a constraint")
     closure = from_msg.loop_closure(graph.received[f"{ROBOT}/constraints"][0])

@@ -85,7 +85,7 @@ class LocalPublisher:
         self._publisher, self._bus = publisher, bus
         bus.offer(publisher.topic_name)
 
-    def tell(self, value: Any, write: Callable[[], Any]) -> None:
+    def publish(self, value: Any, write: Callable[[], Any]) -> None:
         """Publish a value. ``write`` makes its message, and is called only if the topic has a subscriber of ROS."""
         self._bus.hand_over(self._publisher.topic_name, value)
         if self._publisher.get_subscription_count():

@@ -71,8 +71,8 @@ class NodeBase(ManagedNode):
         self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
         self._aside: list[threading.Thread] = []
         self.throttled = ThrottledLog(self.get_logger().warning)
-        self._finished = self.create_publisher(Header, "finished", qos.room(depth=1000))
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.room())
+        self._finished = self.create_publisher(Header, "finished", qos.stage(depth=1000))
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.stage())
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
         life = self.settings.of(ManagedParams) if ManagedParams in kinds else ManagedParams()
         if life.managed and bus is not None:

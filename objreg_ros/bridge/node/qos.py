@@ -23,13 +23,13 @@ def sensor(reliable: bool, depth: int = 10) -> QoSProfile:
     return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability)
 
 
-def room(depth: int = 20) -> QoSProfile:
+def stage(depth: int = 20) -> QoSProfile:
     """The QoS between the nodes: small and reliable."""
     return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=ReliabilityPolicy.RELIABLE)
 
 
 def latched(depth: int = 1) -> QoSProfile:
     """What a late subscriber must still get: the last ``depth`` messages."""
-    profile = room(depth)
+    profile = stage(depth)
     profile.durability = DurabilityPolicy.TRANSIENT_LOCAL
     return profile

@@ -31,9 +31,9 @@ class Announcements:
     def __init__(self, node: Node) -> None:
         self._node, self._robot = node, node.get_namespace().strip("/")
         self._constraints = node.create_publisher(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
-        self._refusals = node.create_publisher(DiagnosticArray, "refusals", qos.room(qos.REFUSALS))
-        self._transforms = node.create_publisher(TransformStamped, "transforms", qos.room(depth=100))
-        self._landmarks = node.create_publisher(PointCloud2, "landmarks", qos.room(depth=100))
+        self._refusals = node.create_publisher(DiagnosticArray, "refusals", qos.stage(qos.REFUSALS))
+        self._transforms = node.create_publisher(TransformStamped, "transforms", qos.stage(depth=100))
+        self._landmarks = node.create_publisher(PointCloud2, "landmarks", qos.stage(depth=100))
         self._markers = node.create_publisher(MarkerArray, "markers", qos.latched())
         self._whole = _Whole(node) if closures_msg.LoopClosureMsg is not None else None
         self._published = Counter[bool]()  # constraints, by whether others confirmed them
@@ -96,5 +96,5 @@ class _Whole:
     def __init__(self, node: Node) -> None:
         kept = qos.latched(qos.KEPT_CONSTRAINTS)
         self.closures = node.create_publisher(closures_msg.LoopClosureMsg, "loop_closures", kept)
-        self.refusals = node.create_publisher(closures_msg.Refusal, "closure_refusals", qos.room(qos.SINGLE_REFUSALS))
-        self.landmarks = node.create_publisher(closures_msg.ObjectLandmarks, "object_landmarks", qos.room(depth=100))
+        self.refusals = node.create_publisher(closures_msg.Refusal, "closure_refusals", qos.stage(qos.SINGLE_REFUSALS))
+        self.landmarks = node.create_publisher(closures_msg.ObjectLandmarks, "object_landmarks", qos.stage(depth=100))

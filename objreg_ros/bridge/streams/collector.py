@@ -54,12 +54,12 @@ class Collector(Node):
         self._listen()
 
     def _listen(self) -> None:
-        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_counters, qos.room(depth=100))
-        self.create_subscription(DiagnosticArray, "refusals", self._on_refusals, qos.room(depth=qos.REFUSALS))
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_counters, qos.stage(depth=100))
+        self.create_subscription(DiagnosticArray, "refusals", self._on_refusals, qos.stage(depth=qos.REFUSALS))
         self.create_subscription(Odometry, "constraints", self._on_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
         self.create_subscription(String, "labels", self._on_labels, qos.latched())
-        self.create_subscription(PointCloud2, "detections_table", self._on_detections, qos.room())
-        self.create_subscription(PointCloud2, "objects", self._on_objects, qos.room())
+        self.create_subscription(PointCloud2, "detections_table", self._on_detections, qos.stage())
+        self.create_subscription(PointCloud2, "objects", self._on_objects, qos.stage())
 
     def spin_until(self, true: Callable[[], bool], seconds: float) -> bool:
         """Let messages come in until something is true or the time is over; whether it became true."""

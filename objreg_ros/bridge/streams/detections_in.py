@@ -56,7 +56,7 @@ class DetectionsIn:
         if LabelInfo is not None and topics.keys() - TABLE.keys():
             node.listen(LabelInfo, "label_info", self._on_names, qos.latched())
         foreign = {topic: node.sensor() for topic in topics if topic not in TABLE}
-        node.listen_to_first("detections", topics, self._decode, self._receive, qos.room(), foreign)
+        node.listen_to_first("detections", topics, self._decode, self._receive, qos.stage(), foreign)
 
     # Receive
 

@@ -76,8 +76,8 @@ class Exchanging:
         self._reader, self._answering = ThreadPoolExecutor(1, "exchange"), False
         self._unread = FairQueue[tuple[int, bytes]](MOST_UNREAD)
         self._summaries = self._both(f"{namespace}/summaries", self._read_later, qos.latched(qos.KEPT_SUMMARIES))
-        self._requests = self._both(f"{namespace}/requests", self._note, qos.room(depth=100))
-        self._keyframes = self._both(f"{namespace}/keyframes", self._deliver, qos.room(depth=qos.KEPT_KEYFRAMES))
+        self._requests = self._both(f"{namespace}/requests", self._note, qos.stage(depth=100))
+        self._keyframes = self._both(f"{namespace}/keyframes", self._deliver, qos.stage(depth=qos.KEPT_KEYFRAMES))
         node.create_timer(LOOK_S, self._answer_later, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _both(self, topic: str, receive: Callable[[int, bytes], None], profile: QoSProfile) -> Publisher:

@@ -60,7 +60,7 @@ class FramesNode(SynchronisedNode):
         self.listen(String, "labels", self.receive_labels, qos.latched())
         self._listen_to_odometry()
         for topic, kind in topics.items():
-            self.listen(kind, topic, self._receive(topic), qos.room(), watched=topic)
+            self.listen(kind, topic, self._receive(topic), qos.stage(), watched=topic)
         self.expect("objects", "objects")
         exact = [Stream(topic) for topic in topics]
         names = "odom", *(["joints"] if is_installed() else [])

@@ -61,10 +61,10 @@ class Player(Node):
     def __init__(self, topics: Mapping[str, str], clock: bool = False, latched: Collection[str] = ()) -> None:
         super().__init__("player")
         self._publishers_of = {
-            topic: self._advertise(topic, kind, qos.latched(LATCHED) if topic in latched else qos.room(QUEUE))
+            topic: self._advertise(topic, kind, qos.latched(LATCHED) if topic in latched else qos.stage(QUEUE))
             for topic, kind in topics.items()
         }
-        self._ticks = self.create_publisher(Clock, "/clock", qos.room()) if clock else None
+        self._ticks = self.create_publisher(Clock, "/clock", qos.stage()) if clock else None
         self._acknowledgements: Acknowledgements | None = None
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self)
@@ -91,7 +91,7 @@ class Player(Node):
 
         A node that is there is waited for until it listens to its inputs: its first start compiles for a while.
         """
-        self.create_subscription(Header, "finished", self._receive, qos.room(depth=1000))
+        self.create_subscription(Header, "finished", self._receive, qos.stage(depth=1000))
         self._spin_until(lambda: set(ORDER) <= self._receipting(), seconds)
         nodes = self._receipting() & set(ORDER)
         if not nodes:

@@ -13,4 +13,4 @@ def check(score_margin: float, least: float) -> Refusal | None:
     """Refuse a pose over which another one that keeps gravity scores nearly as much; larger margins are weighed."""
     if score_margin >= least:
         return None
-    return Reason.CHAINS_DISAGREE, f"another possible pose scores {score_margin:.2f} < {least:.2f} lower"
+    return Reason.PROPOSERS_DISAGREE, f"another possible pose scores {score_margin:.2f} < {least:.2f} lower"

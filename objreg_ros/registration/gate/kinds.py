@@ -65,7 +65,7 @@ KINDS = {
     ),
     "silhouettes": Kind(
         lambda one: one.silhouette_score_nearby,
-        (-0.5, -0.2, 0.0, 0.2, 0.5), True, Reason.CHAINS_DISAGREE, "silhouette score",
+        (-0.5, -0.2, 0.0, 0.2, 0.5), True, Reason.PROPOSERS_DISAGREE, "silhouette score",
     ),
     "matched": Kind(
         lambda one: counted(one.matched),
@@ -73,11 +73,11 @@ KINDS = {
     ),
     "proposers": Kind(
         lambda one: float(independent(one.agreeing_proposers)),
-        (1.0, 2.0, 3.0), True, Reason.CHAINS_DISAGREE, "independent proposers",
+        (1.0, 2.0, 3.0), True, Reason.PROPOSERS_DISAGREE, "independent proposers",
     ),
     "score_margin": Kind(
         lambda one: one.margin_over_competing,
-        (-0.2, 0.0, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0), True, Reason.CHAINS_DISAGREE, "lead over another possible pose",
+        (-0.2, 0.0, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0), True, Reason.PROPOSERS_DISAGREE, "lead over another possible pose",
     ),
     "perturbation_margin": Kind(
         lambda one: one.perturbation_margin,

@@ -14,7 +14,7 @@ from objreg_ros.data import Array
 from objreg_ros.recording import messages
 from objreg_ros.recording.record import Record
 from objreg_ros.recording.writer import write_rosbag2
-from objreg_ros.report.exports.run_scene import Edge, Moment, RunScene, Way
+from objreg_ros.report.exports.run_scene import Edge, Moment, RunScene, Trajectory
 from objreg_ros.whole_file import folder_for, put_whole
 
 MAP, CAMERA = "map", "camera"  # frames
@@ -53,7 +53,7 @@ def _records(scene: RunScene) -> Iterator[Record]:
         yield from _seen(moment)
 
 
-def _path(way: Way, stamp_ns: int) -> Any:
+def _path(way: Trajectory, stamp_ns: int) -> Any:
     poses = [messages.pose_stamped(T, at, MAP) for at, T in zip(way.stamps_ns, way.poses, strict=True)]
     return messages.message("nav_msgs/Path", header=messages.header(stamp_ns, MAP), poses=poses)
 

@@ -47,7 +47,7 @@ def write_rerun(file: Path, scene: RunScene) -> int:
     with folder_for(file) as folder:
         recording = rr.RecordingStream("objreg", recording_id=f"objreg {scene.name}")
         recording.save(folder / "run.rrd")
-        _log_ways(rr, recording, scene)
+        _log_trajectories(rr, recording, scene)
         _log_closures(rr, recording, scene.edges)
         _log_objects(rr, recording, scene)
         count = 0
@@ -58,7 +58,7 @@ def write_rerun(file: Path, scene: RunScene) -> int:
     return count
 
 
-def _log_ways(rr: ModuleType, recording: Any, scene: RunScene) -> None:
+def _log_trajectories(rr: ModuleType, recording: Any, scene: RunScene) -> None:
     for name, way in scene.ways.items():
         lines = rr.LineStrips3D([way.positions], colors=[COLOURS[name]], radii=[THICK_M], labels=[name])
         recording.log(f"map/ways/{name}", lines, static=True)

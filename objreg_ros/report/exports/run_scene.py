@@ -22,7 +22,7 @@ LEAST_COMMON = 3  # poses that truth and map must share for their alignment
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Way:
+class Trajectory:
     """Where the camera was: ``poses (N, 4, 4)`` in the frame of the map at ``stamps_ns``, which rise."""
 
     stamps_ns: tuple[int, ...]
@@ -69,13 +69,13 @@ class RunScene:
     """
 
     name: str
-    ways: Mapping[str, Way]
+    ways: Mapping[str, Trajectory]
     edges: tuple[Edge, ...]
     objects: tuple[tuple[str, Array], ...]
     album: Album
 
     @property
-    def main(self) -> Way:
+    def main(self) -> Trajectory:
         """The trajectory on which the camera is shown."""
         return self.ways["corrected"] if "corrected" in self.ways else self.ways["true"]
 
@@ -98,26 +98,26 @@ def scene_of(story: RunSummary, album: Album) -> RunScene:
     return RunScene(story.name, ways, _edges(story, scene.main), scene.objects, album)
 
 
-def _ways(story: RunSummary) -> dict[str, Way]:
+def _ways(story: RunSummary) -> dict[str, Trajectory]:
     stamps, odometry, corrected = story.poses_before_and_after()
-    if not story.has_way:
-        return _true_way(story, [glimpse.stamp_ns for glimpse in story.glimpses] or story.truth.stamps_ns)
-    ways = {name: Way(tuple(stamps), np.array(poses)) for name, poses in
+    if not story.has_trajectory:
+        return _true_trajectory(story, [glimpse.stamp_ns for glimpse in story.glimpses] or story.truth.stamps_ns)
+    ways = {name: Trajectory(tuple(stamps), np.array(poses)) for name, poses in
             ((story.source, odometry), ("corrected", corrected))}  # fmt: skip
-    true = _true_way(story, stamps).get("true")
+    true = _true_trajectory(story, stamps).get("true")
     if true is not None and len(true.stamps_ns) >= LEAST_COMMON:
         of = dict(zip(stamps, corrected, strict=True))
         T_map_truth = rigid_fit(true.positions, positions([of[stamp] for stamp in true.stamps_ns]))
-        ways["true"] = Way(true.stamps_ns, T_map_truth @ true.poses)
+        ways["true"] = Trajectory(true.stamps_ns, T_map_truth @ true.poses)
     return ways
 
 
-def _true_way(story: RunSummary, stamps_ns: list[int]) -> dict[str, Way]:
+def _true_trajectory(story: RunSummary, stamps_ns: list[int]) -> dict[str, Trajectory]:
     known = {stamp: T for stamp in sorted(set(stamps_ns)) if (T := story.truth.at(stamp)) is not None}
-    return {"true": Way(tuple(known), np.array(list(known.values())))} if known else {}
+    return {"true": Trajectory(tuple(known), np.array(list(known.values())))} if known else {}
 
 
-def _edges(story: RunSummary, way: Way) -> tuple[Edge, ...]:
+def _edges(story: RunSummary, way: Trajectory) -> tuple[Edge, ...]:
     """The closures with both stamps on the trajectory, at the nearest of its poses."""
     stamps, places = np.array(way.stamps_ns), way.positions
     pruned = set(map(id, story.pruned))

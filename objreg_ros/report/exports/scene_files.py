@@ -32,7 +32,7 @@ class SceneFiles:
         files = {"--rerun": self.rerun, "--mcap": self.mcap}
         return {option: file for option, file in files.items() if file is not None}
 
-    def require_way(self, recording: Path, is_known: bool) -> None:
+    def require_trajectory(self, recording: Path, is_known: bool) -> None:
         """ValueError, before the run, where nothing will give the camera's pose."""
         if self.wanted and not is_known:
             raise ValueError(

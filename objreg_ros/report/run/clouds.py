@@ -37,10 +37,10 @@ class Clouds:
 
     def add(self, pair: Pair, album: Album, most_bytes: int) -> None:
         """Both clouds of a pair and its pose, or why they are absent."""
-        stamps_ns = (pair.told.from_ns, pair.told.to_ns)
+        stamps_ns = (pair.outcome.from_ns, pair.outcome.to_ns)
         seen = {stamp_ns: image for stamp_ns in stamps_ns if (image := album.at(stamp_ns)) is not None}
         whys = [why for stamp_ns in stamps_ns if (why := _lacking(seen.get(stamp_ns), album.lacking(stamp_ns)))]
-        if whys or pair.told.T_from_to is None:
+        if whys or pair.outcome.T_from_to is None:
             self.absent[pair.key] = whys[0] if whys else "there is no pose"
             return
         moments = {str(stamp): _cloud(image) for stamp, image in seen.items() if str(stamp) not in self.moments}
@@ -50,7 +50,7 @@ class Clouds:
             return
         self.size += size
         self.moments |= moments
-        self.poses[pair.key] = pair.told.T_from_to[:3].ravel().round(6).tolist()
+        self.poses[pair.key] = pair.outcome.T_from_to[:3].ravel().round(6).tolist()
 
     @property
     def lacking(self) -> str:
@@ -67,7 +67,7 @@ def clouds(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAGE_BY
     if album is None:
         return made
     for pair in by_interest(pairs):
-        if pair.told.T_from_to is None or pair.told.from_ns == pair.told.to_ns:
+        if pair.outcome.T_from_to is None or pair.outcome.from_ns == pair.outcome.to_ns:
             continue
         if LEFT_OUT in made.absent.values():
             made.absent[pair.key] = LEFT_OUT

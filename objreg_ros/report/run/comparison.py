@@ -142,9 +142,11 @@ def _changed(pair: Pair, run: int, other: RunSummary) -> View:
 
 def _instead(pair: Pair, other: RunSummary) -> str:
     """Why the other run refused the same pair; ``not tried`` where it did not try it."""
-    if not isinstance(pair.told, LoopClosure):
+    if not isinstance(pair.outcome, LoopClosure):
         return ""
-    near = [(apart, refusal) for refusal in other.refusals if (apart := _apart_ns(pair.told, refusal)) <= KEYFRAME_NS]
+    near = [
+        (apart, refusal) for refusal in other.refusals if (apart := _apart_ns(pair.outcome, refusal)) <= KEYFRAME_NS
+    ]
     if not near:
         return "not tried"
     refusal = min(near, key=lambda item: item[0])[1]

@@ -66,7 +66,7 @@ def _draw_box(picture: Array, xyxy: Array, name: str) -> None:
     cv2.putText(picture, name, (left + 2, bottom - base), FONT, FONT_SIZE, (255, 255, 255), 1, cv2.LINE_AA)
 
 
-def draw_way(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
+def draw_trajectory(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
     """Write the camera's trajectory from above with its closures, the true ones green and the false ones red.
 
     The plane is that of the two directions in which the trajectory extends most. ValueError where the truth has no

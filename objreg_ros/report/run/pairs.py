@@ -22,57 +22,57 @@ class Pair:
     """A constraint or a refusal. ``key`` names it on the page, within its run."""
 
     key: str
-    told: LoopClosure | Rejected
+    outcome: LoopClosure | Rejected
     story: RunSummary
 
     @property
     def verdict(self) -> str:
         """Accepted, false or refused: its CSS class."""
-        if isinstance(self.told, Rejected):
+        if isinstance(self.outcome, Rejected):
             return "refused"
-        return "false" if self.story.is_false(self.told) else ACCEPTED
+        return "false" if self.story.is_false(self.outcome) else ACCEPTED
 
     @property
     def reason(self) -> str:
         """Why it was refused, `ACCEPTED` where it was not."""
-        return self.told.reason.value if isinstance(self.told, Rejected) else ACCEPTED
+        return self.outcome.reason.value if isinstance(self.outcome, Rejected) else ACCEPTED
 
     @property
     def tried(self) -> bool:
         """Whether something was registered."""
-        return isinstance(self.told, LoopClosure) or self.told.reason not in UNTRIED
+        return isinstance(self.outcome, LoopClosure) or self.outcome.reason not in UNTRIED
 
     @property
     def labels(self) -> tuple[str, ...]:
         """What closed it, each once; of a refusal what was detected in both frames."""
-        if isinstance(self.told, LoopClosure):
-            return tuple(dict.fromkeys(self.told.labels))
-        return self.story.seen_at_both(self.told.from_ns, self.told.to_ns)
+        if isinstance(self.outcome, LoopClosure):
+            return tuple(dict.fromkeys(self.outcome.labels))
+        return self.story.seen_at_both(self.outcome.from_ns, self.outcome.to_ns)
 
     @property
     def seconds(self) -> tuple[float, float]:
         """Both times since the run began, s."""
-        return self.story.seconds(self.told.from_ns), self.story.seconds(self.told.to_ns)
+        return self.story.seconds(self.outcome.from_ns), self.story.seconds(self.outcome.to_ns)
 
     @cached_property
     def error(self) -> Error | None:
         """Degrees and centimetres by which the pose is wrong; None without truth or without a pose."""
-        return self.story.truth.error(self.told)
+        return self.story.truth.error(self.outcome)
 
     @property
     def words(self) -> str:
         """The numbers behind a refusal, what moved, and the true error."""
-        if isinstance(self.told, Rejected):
-            parts = [self.told.detail]
+        if isinstance(self.outcome, Rejected):
+            parts = [self.outcome.detail]
         else:
-            parts = [f"{label} moved by {metres:.2f} m" for label, metres in self.told.moved.items()]
+            parts = [f"{label} moved by {metres:.2f} m" for label, metres in self.outcome.moved.items()]
         return ". ".join(part for part in (*parts, self._in_truth) if part)
 
     @property
     def _in_truth(self) -> str:
         """How far the two cameras are apart, and by how much the pose is wrong; empty without truth."""
-        truth = self.story.truth.between(self.told.from_ns, self.told.to_ns)
-        if truth is None or self.told.from_ns == self.told.to_ns:
+        truth = self.story.truth.between(self.outcome.from_ns, self.outcome.to_ns)
+        if truth is None or self.outcome.from_ns == self.outcome.to_ns:
             return ""
         degrees, metres = np.degrees(rotation_angle(truth[:3, :3])), float(np.linalg.norm(truth[:3, 3]))
         apart = f"In truth {degrees:.0f}° and {metres:.1f} m apart"
@@ -92,4 +92,4 @@ def pairs_of(story: RunSummary) -> list[Pair]:
 def by_interest(pairs: Iterable[Pair]) -> list[Pair]:
     """False constraints first, then right ones, refused poses, what was tried without one, and the rest."""
     ranks = {"false": 0, ACCEPTED: 1, "refused": 2}
-    return sorted(pairs, key=lambda pair: (not pair.tried, pair.told.T_from_to is None, ranks[pair.verdict]))
+    return sorted(pairs, key=lambda pair: (not pair.tried, pair.outcome.T_from_to is None, ranks[pair.verdict]))

@@ -165,14 +165,14 @@ class RunSummary:
         return stamps, [frame.T_map_camera_before for frame in frames], [frame.T_map_camera for frame in frames]
 
     @property
-    def has_way(self) -> bool:
+    def has_trajectory(self) -> bool:
         """Whether there is a trajectory to draw. One frame of our own tracking is none."""
         return len(self.map.frames) > self.by_tracking
 
     def tracks(self) -> Tracks | None:
         """Odometry, or our own tracking, corrected and true trajectory, over each other; None without any to draw."""
         stamps, odometry, corrected = self.poses_before_and_after()
-        if not self.has_way:
+        if not self.has_trajectory:
             return None
         true = [self.truth.at(stamp) for stamp in stamps]
         known = [k for k, T in enumerate(true) if T is not None]
@@ -193,7 +193,7 @@ class RunSummary:
             self.source,
         )
 
-    def true_way(self) -> tuple[Array, Array] | None:
+    def true_trajectory(self) -> tuple[Array, Array] | None:
         """The stamps of the frames that truth covers and the true positions (N, 3) m there; None for fewer than two.
 
         Without frames, all of the truth.
@@ -204,7 +204,7 @@ class RunSummary:
             return None
         return np.array([stamp for stamp, _ in known]), positions([T for _, T in known])
 
-    def tracked_way(self) -> tuple[Array, Array] | None:
+    def tracked_trajectory(self) -> tuple[Array, Array] | None:
         """The stamps of the longest session of our own tracking, and ``T_session_camera (N, 4, 4)`` there.
 
         None for fewer than two frames. Another session begins where the track was lost.

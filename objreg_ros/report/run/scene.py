@@ -45,7 +45,7 @@ def _levelling(story: RunSummary, stamps_ns: Array, tracks: Tracks | None) -> Ar
     stamps_ns = stamps_ns[:: len(stamps_ns) // 100 or 1]
     if tracks is None:
         poses = [T for stamp in stamps_ns if (T := story.truth.at(int(stamp))) is not None]
-        if not poses and (tracked := story.tracked_way()) is not None:
+        if not poses and (tracked := story.tracked_trajectory()) is not None:
             poses = list(tracked[1])
     else:
         mapped = {frame.stamp_ns: frame.T_map_camera for frame in story.map.frames}

@@ -135,11 +135,11 @@ def _change(before: float, after: float, source: str) -> str:
 def _way(story: RunSummary, tracks: Tracks | None) -> View:
     """The drawings of the trajectory; of the truth without odometry, and of our own tracking without either."""
     if tracks is not None:
-        stamps_ns, lines, text = tracks.stamps_ns, tracks.lines, _way_words(story)
-    elif (true := story.true_way()) is not None:
+        stamps_ns, lines, text = tracks.stamps_ns, tracks.lines, _trajectory_words(story)
+    elif (true := story.true_trajectory()) is not None:
         stamps_ns, lines = true[0], {"true": true[1]}
         text = "From above. There is no odometry in this run: the trajectory is the ground truth, and is not corrected."
-    elif (tracked := story.tracked_way()) is not None:
+    elif (tracked := story.tracked_trajectory()) is not None:
         stamps_ns, lines = tracked[0], {"tracked": tracked[1][:, :3, 3]}
         text = (
             "From above. There is neither odometry nor ground truth in this run: the trajectory is our own tracking's, "
@@ -165,7 +165,7 @@ def _in_both_widths(draw: Callable[[int], str], wide: int = figures.WIDE) -> Vie
     return {"wide": drawn, "narrow": draw(figures.NARROW)} if drawn else None
 
 
-def _way_words(story: RunSummary) -> str:
+def _trajectory_words(story: RunSummary) -> str:
     source = NAMES.get(story.source, story.source)
     text = f"From above. Closures tie places that were seen twice; the pose graph takes the drift out of {source}."
     if story.by_tracking:
@@ -246,8 +246,8 @@ def _row(pair: Pair) -> View:
         "name": pair.verdict if pair.reason == ACCEPTED else spaced(pair.reason),
         "seconds": pair.seconds,
         "labels": ", ".join(pair.labels),
-        "score": pair.told.evidence.get("score"),
-        "odds": pair.told.evidence.get("odds"),
+        "score": pair.outcome.evidence.get("score"),
+        "odds": pair.outcome.evidence.get("odds"),
         "degrees": degrees,
         "centimetres": centimetres,
     }
@@ -256,13 +256,13 @@ def _row(pair: Pair) -> View:
 def _pane(pair: Pair) -> View:
     """The text of the pane beside the pictures of a pair."""
     return {
-        "from": str(pair.told.from_ns),
-        "to": str(pair.told.to_ns),
+        "from": str(pair.outcome.from_ns),
+        "to": str(pair.outcome.to_ns),
         "meaning": MEANINGS.get(pair.reason, ""),
         "words": pair.words,
         "evidence": [
             (name, f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}")
-            for name, value in pair.told.evidence.items()
+            for name, value in pair.outcome.evidence.items()
         ],
     }
 
@@ -277,7 +277,7 @@ def _lacking(drawn: Thumbnails, count: int) -> str:
 
 def _galleries(pairs: Sequence[Pair], story: RunSummary, album: Album) -> list[View]:
     """A few accepted and a few refused pairs with their pictures."""
-    by_identity = {id(pair.told): pair for pair in pairs}
+    by_identity = {id(pair.outcome): pair for pair in pairs}
     accepted = [by_identity[id(closure)] for closure in chosen_closures(story)]
     refused = [by_identity[id(refusal)] for refusal in chosen_refusals(story)]
     tried = "Candidates that were tried and refused. Right: the second picture laid over the first by the refused pose."
@@ -290,7 +290,7 @@ def _galleries(pairs: Sequence[Pair], story: RunSummary, album: Album) -> list[V
 
 def _gallery(title: str, text: str, chosen: Sequence[Pair], album: Album) -> View:
     cards = [card for pair in chosen if (card := _card(pair, album))]
-    whys = Counter(why for p in chosen if (why := album.lacking(p.told.from_ns) or album.lacking(p.told.to_ns)))
+    whys = Counter(why for p in chosen if (why := album.lacking(p.outcome.from_ns) or album.lacking(p.outcome.to_ns)))
     reasons = "; ".join(why if count == 1 else f"{why} ({count} times)" for why, count in whys.most_common())
     lacking = f"No picture of {whys.total()} of these {len(chosen)}: {reasons}." if whys else ""
     return {"title": title, "words": " ".join(filter(None, (text if cards else "", lacking))), "cards": cards}
@@ -298,12 +298,12 @@ def _gallery(title: str, text: str, chosen: Sequence[Pair], album: Album) -> Vie
 
 def _card(pair: Pair, album: Album) -> View | None:
     """Two pictures side by side and over each other; None where the recording lacks a picture."""
-    first, second = album.at(pair.told.from_ns), album.at(pair.told.to_ns)
+    first, second = album.at(pair.outcome.from_ns), album.at(pair.outcome.to_ns)
     if first is None or second is None or first.rgb is None or second.rgb is None:
         return None
     pictures = [(data_uri(rgb), f"{s:.1f} s") for rgb, s in zip((first.rgb, second.rgb), pair.seconds, strict=True)]
-    if pair.told.T_from_to is not None:
-        pictures.append((data_uri(overlay(first, second, pair.told.T_from_to)), "laid over each other"))
+    if pair.outcome.T_from_to is not None:
+        pictures.append((data_uri(overlay(first, second, pair.outcome.T_from_to)), "laid over each other"))
     return {**_row(pair), "words": pair.words, "pictures": pictures}
 
 

@@ -30,12 +30,12 @@ class Thumbnails:
 
     def add(self, pair: Pair, album: Album, most_bytes: int) -> None:
         """Both pictures of a pair, and the second over the first by its pose; nothing where they have no place."""
-        first, second = album.at(pair.told.from_ns), album.at(pair.told.to_ns)
+        first, second = album.at(pair.outcome.from_ns), album.at(pair.outcome.to_ns)
         if first is None or second is None:
-            self.lacking[album.lacking(pair.told.from_ns) or album.lacking(pair.told.to_ns)] += 1
+            self.lacking[album.lacking(pair.outcome.from_ns) or album.lacking(pair.outcome.to_ns)] += 1
             return
-        moments = self._new_moments({pair.told.from_ns: first, pair.told.to_ns: second})
-        T_from_to = pair.told.T_from_to
+        moments = self._new_moments({pair.outcome.from_ns: first, pair.outcome.to_ns: second})
+        T_from_to = pair.outcome.T_from_to
         over = "" if T_from_to is None else data_uri(overlay(first, second, T_from_to), QUALITY)
         size = sum(map(len, moments.values())) + len(over)
         if self.size + size > most_bytes:
@@ -61,7 +61,7 @@ def thumbnails(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAG
     if album is None:
         return drawn
     for pair in by_interest(pairs):
-        if pair.told.from_ns == pair.told.to_ns:
+        if pair.outcome.from_ns == pair.outcome.to_ns:
             continue
         if drawn.left_out:
             drawn.left_out += 1

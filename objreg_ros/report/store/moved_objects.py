@@ -26,7 +26,7 @@ SAME_M = 1e-3  # between the distance in the evidence and that of its two object
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Telling:
+class MoveNote:
     """The report of closure number ``closure`` on one object: it moved by ``metres`` from ``there`` to ``here``.
 
     ``stood (3,)`` is its earlier position in m, in the session of ``here``.
@@ -48,7 +48,7 @@ class Move:
 
     there: Sighting
     here: Sighting
-    nearest: Telling
+    nearest: MoveNote
     closures: int
 
 
@@ -65,7 +65,7 @@ def moves_in(store: Store, sightings: Sequence[Sighting]) -> Moves:
     ids: defaultdict[int, set[int]] = defaultdict(set)
     for sighting in sightings:
         ids[sighting.stamp_ns].add(sighting.keyframe_id)
-    reports: list[Telling] = []
+    reports: list[MoveNote] = []
     untold = 0
     for number, closure in enumerate(store.closures()):
         for label, metres in _distances(closure):
@@ -84,7 +84,7 @@ def _distances(closure: LoopClosure) -> Iterator[tuple[str, float]]:
 
 def _tellings(
     store: Store, ids: dict[int, set[int]], number: int, closure: LoopClosure, label: str, metres: float
-) -> Iterator[Telling]:
+) -> Iterator[MoveNote]:
     """The reports on the keyframes of both stamps. Two runs of one recording share their stamps: it holds for both."""
     for from_id in sorted(ids.get(closure.from_ns, ())):
         for to_id in sorted(ids.get(closure.to_ns, ())):
@@ -94,7 +94,7 @@ def _tellings(
 
 def _between(
     store: Store, ids: tuple[int, int], number: int, T_from_to: Array, label: str, metres: float
-) -> Iterator[Telling]:
+) -> Iterator[MoveNote]:
     try:
         before, after = (store.keyframe(keyframe_id) for keyframe_id in ids)
     except StoreError:
@@ -106,18 +106,18 @@ def _between(
     for i, j in np.argwhere(np.abs(distances - metres) < SAME_M).tolist():
         if here[j].label == label:
             stood = transform(T_session_to, gone[i])
-            yield Telling(closure=number, there=there[i], here=here[j], stood=stood, metres=metres)
+            yield MoveNote(closure=number, there=there[i], here=here[j], stood=stood, metres=metres)
 
 
 def _middles(keyframe: Keyframe) -> Array:
     return np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3)
 
 
-def _by_object(reports: Sequence[Telling]) -> list[list[Telling]]:
+def _by_object(reports: Sequence[MoveNote]) -> list[list[MoveNote]]:
     """The reports on each object: landmarks are of one object where a report joins them."""
-    groups: list[tuple[set[int], list[Telling]]] = []
-    for telling in reports:
-        landmarks, of_one = {telling.there.landmark, telling.here.landmark}, [telling]
+    groups: list[tuple[set[int], list[MoveNote]]] = []
+    for note in reports:
+        landmarks, of_one = {note.there.landmark, note.here.landmark}, [note]
         for group in [group for group in groups if group[0] & landmarks]:
             groups.remove(group)
             landmarks, of_one = landmarks | group[0], group[1] + of_one
@@ -125,16 +125,16 @@ def _by_object(reports: Sequence[Telling]) -> list[list[Telling]]:
     return [of_one for _, of_one in groups]
 
 
-def _fewest(reports: Sequence[Telling]) -> Iterator[Move]:
+def _fewest(reports: Sequence[MoveNote]) -> Iterator[Move]:
     """As few moves as explain all reports: each lies in every span that begins before its first one ends."""
-    left = sorted(reports, key=lambda telling: telling.here.keyframe_id)
+    left = sorted(reports, key=lambda note: note.here.keyframe_id)
     while left:
         end = left[0].here.keyframe_id
-        together = [telling for telling in left if telling.there.keyframe_id < end]
-        left = [telling for telling in left if telling.there.keyframe_id >= end]
+        together = [note for note in left if note.there.keyframe_id < end]
+        left = [note for note in left if note.there.keyframe_id >= end]
         yield Move(
-            there=max((telling.there for telling in together), key=lambda s: s.keyframe_id),
+            there=max((note.there for note in together), key=lambda s: s.keyframe_id),
             here=together[0].here,
             nearest=min(together, key=lambda t: t.here.keyframe_id - t.there.keyframe_id),
-            closures=len({telling.closure for telling in together}),
+            closures=len({note.closure for note in together}),
         )

@@ -25,7 +25,7 @@ class House:
     def __init__(self) -> None:
         self.bus = IntraProcessBus()
         self.speaker, self.listener = (NodeBase(name, bus=self.bus) for name in ("speaker", "listener"))
-        self.outlet = self.speaker.offer(String, "word", qos.room())
+        self.outlet = self.speaker.offer(String, "word", qos.stage())
         self.written: list[Any] = []
         self.received: list[Any] = []
         self.executor = SingleThreadedExecutor()
@@ -36,8 +36,8 @@ class House:
     def nodes(self) -> tuple[NodeBase, NodeBase]:
         return self.speaker, self.listener
 
-    def tell(self, word: object) -> None:
-        self.outlet.tell(word, lambda: self.write(word))
+    def publish(self, word: object) -> None:
+        self.outlet.publish(word, lambda: self.write(word))
 
     def write(self, word: object) -> String:
         self.written.append(word)
@@ -65,10 +65,10 @@ def house(monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
 def test_words_come_by_the_executor_in_order_and_no_message_is_written(house: House) -> None:
     threads = set[int]()
     house.listener.listen(
-        String, "word", lambda word: (house.received.append(word), threads.add(threading.get_ident())), qos.room()
+        String, "word", lambda word: (house.received.append(word), threads.add(threading.get_ident())), qos.stage()
     )
     told = [object() for _ in range(50)]
-    teller = threading.Thread(target=lambda: [house.tell(word) for word in told])
+    teller = threading.Thread(target=lambda: [house.publish(word) for word in told])
     teller.start()
     teller.join()
     assert house.received == []
@@ -80,9 +80,9 @@ def test_words_come_by_the_executor_in_order_and_no_message_is_written(house: Ho
 def test_a_message_is_written_where_somebody_listens_outside(house: House) -> None:
     other = rclpy.create_node("other")
     house.executor.add_node(other)
-    other.create_subscription(String, "word", house.received.append, qos.room())
+    other.create_subscription(String, "word", house.received.append, qos.stage())
     assert house.spin_until(lambda: house.speaker.count_subscribers("/word") == 1)
-    assert house.spin_until(lambda: bool(house.received) or bool(house.tell(7)))
+    assert house.spin_until(lambda: bool(house.received) or bool(house.publish(7)))
     assert house.received[0].data == "7"
     other.destroy_node()
 
@@ -93,9 +93,9 @@ def test_a_word_that_breaks_its_contract_is_counted_and_the_next_one_heard(house
             raise ValueError("expected better")
         house.received.append(word)
 
-    house.listener.listen(String, "word", receive, qos.room())
-    house.tell("bad")
-    house.tell("good")
+    house.listener.listen(String, "word", receive, qos.stage())
+    house.publish("bad")
+    house.publish("good")
     assert house.spin_until(lambda: house.received == ["good"])
     assert house.listener._ignored == {"malformed word": 1}
 
@@ -106,19 +106,19 @@ def test_a_topic_that_was_closed_is_heard_no_more(house: House) -> None:
             raise ValueError("expected better")
 
     house.listener.listen_to_first(
-        "words", {"word": String, "other": String}, decode, lambda _, word: house.received.append(word), qos.room()
+        "words", {"word": String, "other": String}, decode, lambda _, word: house.received.append(word), qos.stage()
     )
-    house.tell("good")
+    house.publish("good")
     assert house.spin_until(lambda: house.received == ["good"]) and house.listener.taken("words") == "word"
     house.listener.hang_up("words")
-    house.tell("more")
+    house.publish("more")
     for _ in range(5):
         house.executor.spin_once(timeout_sec=0.01)
     assert house.received == ["good"] and house.listener.connected == {}
 
 
 def test_a_topic_that_nobody_offers_here_is_subscribed_to(house: House) -> None:
-    subscription = house.listener.listen(String, "far", house.received.append, qos.room())
+    subscription = house.listener.listen(String, "far", house.received.append, qos.stage())
     assert house.listener.count_subscribers("/far") == 1 and subscription.topic_name == "/far"
 
 
@@ -127,8 +127,8 @@ def test_who_passes_a_topic_on_hears_it_from_outside_also_when_it_is_opened_agai
     for topic in topics:
         node.pass_on(topic)
     told = lambda _, message: house.received.append(message.data)  # noqa: E731
-    node.listen_to_first("words", topics, lambda *_: None, told, qos.room())
-    senders = {topic: house.listener.create_publisher(String, topic, qos.room()) for topic in topics}
+    node.listen_to_first("words", topics, lambda *_: None, told, qos.stage())
+    senders = {topic: house.listener.create_publisher(String, topic, qos.stage()) for topic in topics}
     assert house.spin_until(lambda: node.count_publishers("/raw") == 1 and node.count_publishers("/packed") == 1)
     assert house.spin_until(lambda: "a" in house.received or bool(senders["raw"].publish(String(data="a"))))
     assert node.taken("words") == "raw"

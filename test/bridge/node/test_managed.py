@@ -29,9 +29,9 @@ class Shop(NodeBase):
         super().__init__("shop", ManagedParams, bus=bus)
 
     def open(self) -> None:
-        self.listen(String, "bell", self.notes.append, qos.room())
+        self.listen(String, "bell", self.notes.append, qos.stage())
         self.create_timer(1.0, lambda: None)
-        self.create_publisher(String, "sign", qos.room())
+        self.create_publisher(String, "sign", qos.stage())
         if self.trouble is not None:
             raise self.trouble
         self.notes.append("opened")

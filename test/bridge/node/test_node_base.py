@@ -111,8 +111,8 @@ def test_a_message_that_breaks_where_it_is_heard_is_counted_and_the_next_one_is_
             raise error
         received.append(message.data)
 
-    node.listen(String, "word", receive, qos.room())
-    word = node.create_publisher(String, "word", qos.room())
+    node.listen(String, "word", receive, qos.stage())
+    word = node.create_publisher(String, "word", qos.stage())
     spin_until(node, [] if word.get_subscription_count() == 0 else [1], 1)
     for data in ("bad", "good"):
         word.publish(String(data=data))
@@ -203,8 +203,8 @@ def test_a_message_aside_that_breaks_its_contract_is_nothing(node: NodeBase) -> 
 
 def test_of_topics_that_carry_the_same_the_first_that_speaks_is_kept_and_the_others_are_closed(node: NodeBase) -> None:
     received: list[tuple[str, str]] = []
-    node.listen_to_first("words", WORDS, decode, lambda topic, m: received.append((topic, m.data)), qos.room())
-    loud, quiet = (node.create_publisher(String, topic, qos.room()) for topic in ("loud", "quiet"))
+    node.listen_to_first("words", WORDS, decode, lambda topic, m: received.append((topic, m.data)), qos.stage())
+    loud, quiet = (node.create_publisher(String, topic, qos.stage()) for topic in ("loud", "quiet"))
     spin_until(node, [] if loud.get_subscription_count() == 0 else [1], 1)
     loud.publish(String(data="one"))
     spin_until(node, received, 1)
@@ -218,8 +218,8 @@ def test_of_topics_that_carry_the_same_the_first_that_speaks_is_kept_and_the_oth
 
 def test_a_message_that_does_not_decode_closes_no_topic(node: NodeBase) -> None:
     received: list[str] = []
-    node.listen_to_first("words", WORDS, decode, lambda topic, m: received.append(m.data), qos.room())
-    loud, quiet = (node.create_publisher(String, topic, qos.room()) for topic in ("loud", "quiet"))
+    node.listen_to_first("words", WORDS, decode, lambda topic, m: received.append(m.data), qos.stage())
+    loud, quiet = (node.create_publisher(String, topic, qos.stage()) for topic in ("loud", "quiet"))
     spin_until(node, [] if quiet.get_subscription_count() == 0 else [1], 1)
     for publisher, word in ((loud, "junk"), (loud, "bug"), (quiet, "one")):
         publisher.publish(String(data=word))
@@ -229,7 +229,7 @@ def test_a_message_that_does_not_decode_closes_no_topic(node: NodeBase) -> None:
 
 
 def test_the_other_topics_are_opened_again_once_the_one_that_was_taken_is_silent(node: NodeBase) -> None:
-    node.listen_to_first("words", WORDS, decode, lambda *_: None, qos.room())
+    node.listen_to_first("words", WORDS, decode, lambda *_: None, qos.stage())
     choice = node._choices["words"]
     choice.receive("loud", String(data="one"))
     assert node.count_subscribers("/quiet") == 0
@@ -240,7 +240,7 @@ def test_the_other_topics_are_opened_again_once_the_one_that_was_taken_is_silent
 
 
 def test_an_input_that_is_hung_up_has_no_subscriptions_and_hears_nothing_more(node: NodeBase) -> None:
-    node.listen_to_first("words", WORDS, decode, lambda *_: None, qos.room())
+    node.listen_to_first("words", WORDS, decode, lambda *_: None, qos.stage())
     assert node.count_subscribers("/quiet") == node.count_subscribers("/loud") == 1
     node.hang_up("words")
     node.hang_up("never opened")
@@ -282,8 +282,8 @@ def test_while_a_service_waits_for_work_aside_the_node_hears_on(node: NodeBase) 
         go.set()
 
     node.create_service(Trigger, "save", answer, callback_group=node.apart)
-    node.listen(String, "word", receive, qos.room())
-    client, word = node.create_client(Trigger, "save"), node.create_publisher(String, "word", qos.room())
+    node.listen(String, "word", receive, qos.stage())
+    client, word = node.create_client(Trigger, "save"), node.create_publisher(String, "word", qos.stage())
     spin_until(node, [] if word.get_subscription_count() == 0 else [1], 1)
     asked = client.call_async(Trigger.Request())
     for _ in range(5):

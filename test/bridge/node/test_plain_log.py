@@ -55,8 +55,8 @@ def test_severities_may_come_in_turn(node: NodeBase, capfd: pytest.CaptureFixtur
 
 def test_what_a_peer_sends_is_logged_as_plain_text(node: NodeBase, capfd: pytest.CaptureFixture[str]) -> None:
     peer = rclpy.create_node("peer")
-    publisher = peer.create_publisher(String, "labels", qos.room())
-    node.listen(String, "labels", refuse, qos.room())
+    publisher = peer.create_publisher(String, "labels", qos.stage())
+    node.listen(String, "labels", refuse, qos.stage())
     sent = HOSTILE.replace("\x00", "")  # which DDS would end the text at
     for _ in range(200):
         publisher.publish(String(data=sent))

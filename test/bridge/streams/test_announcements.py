@@ -69,8 +69,8 @@ def test_with_objreg_msgs_all_that_is_known_is_told_under_the_name_of_the_namesp
         pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
     telling = Announcements(node)
     assert topics(node) == COMMON | WHOLE
-    refusals = received(node, closures_msg.Refusal, "closure_refusals", qos.room())
-    landmarks = received(node, closures_msg.ObjectLandmarks, "object_landmarks", qos.room())
+    refusals = received(node, closures_msg.Refusal, "closure_refusals", qos.stage())
+    landmarks = received(node, closures_msg.ObjectLandmarks, "object_landmarks", qos.stage())
     telling.closures([CLOSURE])
     closures = received(node, closures_msg.LoopClosureMsg, "loop_closures", qos.latched())  # it comes late
     deadline = time.monotonic() + 20.0

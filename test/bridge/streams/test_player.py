@@ -57,7 +57,7 @@ class Graph:
         return self.nodes[name]
 
     def receive(self, kind: type, topic: str, take: Callable[[object], object]) -> None:
-        self.node("listener").create_subscription(kind, topic, lambda m: self.received.append(take(m)), qos.room(100))
+        self.node("listener").create_subscription(kind, topic, lambda m: self.received.append(take(m)), qos.stage(100))
 
     def wait_for(self, count: int) -> list[object]:
         until(lambda: len(self.received) >= count)
@@ -66,14 +66,14 @@ class Graph:
     def detector(self, answers: bool = True) -> Publisher:
         """A node that acknowledgements every image as soon as it comes, or not at all."""
         node = self.node("detector")
-        finished = node.create_publisher(Header, "finished", qos.room(100))
+        finished = node.create_publisher(Header, "finished", qos.stage(100))
 
         def answer(message: Image) -> None:
             self.received.append(from_msg.stamp_ns(message))
             if answers:
                 finished.publish(to_msg.finished("detector", from_msg.stamp_ns(message)))
 
-        node.create_subscription(Image, "image", answer, qos.room(100))
+        node.create_subscription(Image, "image", answer, qos.stage(100))
         return finished
 
     def close(self) -> None:
@@ -203,8 +203,8 @@ def test_a_node_that_does_not_hear_its_inputs_is_told(
     graph: Graph, player: Player, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(player_module, "START_S", 0.1)
-    graph.node("segmenter").create_publisher(Header, "finished", qos.room())
-    graph.node("segmenter").create_subscription(String, "labels", print, qos.room())
+    graph.node("segmenter").create_publisher(Header, "finished", qos.stage())
+    graph.node("segmenter").create_subscription(String, "labels", print, qos.stage())
     until(lambda: player.count_publishers("finished") == player.count_subscribers("labels") == 1)
     with pytest.raises(ValueError, match=r"expected listening nodes, got none on detections_table$"):
         player.subscribe_to_acknowledgements(0.0)
@@ -223,7 +223,7 @@ def test_who_comes_late_still_gets_what_was_latched(graph: Graph) -> None:
         received: list[str] = []
         for topic in ("words", "static"):
             player.create_subscription(String, topic, lambda m: received.append(m.data), qos.latched(5))
-            player.create_subscription(String, topic, lambda m: received.append(m.data), qos.room())
+            player.create_subscription(String, topic, lambda m: received.append(m.data), qos.stage())
         deadline = time.monotonic() + 5.0
         while not received and time.monotonic() < deadline:
             rclpy.spin_once(player, timeout_sec=0.05)

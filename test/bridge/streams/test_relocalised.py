@@ -99,7 +99,7 @@ def test_what_becomes_known_is_published_once_and_again_after_it_was_forgotten(m
 def test_initialpose_is_told_where_it_is_asked_for_and_lies_on_the_plane(make: Making) -> None:
     node = make("initialpose:=true")
     received = []
-    node.create_subscription(PoseWithCovarianceStamped, "initialpose", received.append, qos.room())
+    node.create_subscription(PoseWithCovarianceStamped, "initialpose", received.append, qos.stage())
     telling = Whereabouts(node, lambda: KNOWN)
     telling.mounted(ON_BODY)
     assert wait_for(node, lambda: node.count_subscribers("initialpose") == 1)
@@ -115,7 +115,7 @@ def test_no_initialpose_is_told_of_a_map_that_may_be_tilted_or_of_a_camera(
 ) -> None:
     node, said, received = make("initialpose:=true"), list[str](), list[object]()
     node.throttled._write = said.append
-    node.create_subscription(PoseWithCovarianceStamped, "initialpose", received.append, qos.room())
+    node.create_subscription(PoseWithCovarianceStamped, "initialpose", received.append, qos.stage())
     telling = Whereabouts(node, lambda: (replace(FOUND, by_odometry=by_odometry), "known"))
     telling.mounted(mount)
     assert wait_for(node, lambda: node.count_subscribers("initialpose") == 1)

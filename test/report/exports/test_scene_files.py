@@ -30,7 +30,7 @@ def test_without_the_sdk_the_error_names_the_extra_before_the_run(monkeypatch: p
 
 
 def test_a_run_without_any_way_is_refused_before_it_begins() -> None:
-    SceneFiles().require_way(Path("bag"), is_known=False)
-    SceneFiles(mcap=Path("run.mcap")).require_way(Path("bag"), is_known=True)
+    SceneFiles().require_trajectory(Path("bag"), is_known=False)
+    SceneFiles(mcap=Path("run.mcap")).require_trajectory(Path("bag"), is_known=True)
     with pytest.raises(ValueError, match="bag: --mcap: expected odometry or a ground truth"):
-        SceneFiles(mcap=Path("run.mcap")).require_way(Path("bag"), is_known=False)
+        SceneFiles(mcap=Path("run.mcap")).require_trajectory(Path("bag"), is_known=False)

@@ -29,7 +29,7 @@ def test_the_way_shows_three_lines_and_a_link_a_closure() -> None:
 
 def test_the_closures_of_a_run_without_odometry_are_drawn_on_the_true_way() -> None:
     blind = RunSummary.of("blind", {**summary(), "glimpses": []}, TRUTH)
-    stamps_ns, true = blind.true_way()
+    stamps_ns, true = blind.true_trajectory()
     svg = figures.way(blind, stamps_ns, {"true": true})
     assert [count(svg, style) for style in ("true", "odometry", "link")] == [1, 0, 4]
 

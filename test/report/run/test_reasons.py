@@ -11,7 +11,7 @@ import pytest
 
 from objreg_ros.bridge.streams.sync import Drop
 from objreg_ros.data import Reason
-from objreg_ros.report.run.reasons import DROPS, MEANINGS, REFUSALS, Words
+from objreg_ros.report.run.reasons import DROPS, MEANINGS, REFUSALS, ReasonText
 
 ALL = {**REFUSALS, **DROPS}
 
@@ -40,7 +40,7 @@ def test_every_drop_has_its_meaning(repository: Path) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_reason_says_what_to_do_and_names_parameters_and_limits_that_exist(name: str, repository: Path) -> None:
-    words: Words = ALL[name]
+    words: ReasonText = ALL[name]
     assert words.meaning and not words.meaning.endswith(".") and words.remedy.endswith(".")
     assert set(words.parameters) <= parameters(repository)
     for file, limit in words.limits:

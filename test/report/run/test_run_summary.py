@@ -181,4 +181,4 @@ def test_of_a_track_that_was_lost_the_largest_part_is_on_the_map() -> None:
 
 def test_without_an_order_to_track_the_track_is_no_map() -> None:
     story = RunSummary.of("walk", {**tracked(), "odometry": None}, TRUTH)
-    assert story.tracks() is None and story.trajectory() is None and len(story.tracked_way()[0]) == COUNT
+    assert story.tracks() is None and story.trajectory() is None and len(story.tracked_trajectory()[0]) == COUNT

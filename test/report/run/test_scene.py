@@ -49,7 +49,7 @@ def test_objects_are_where_truth_has_them_and_named_once() -> None:
 
 def test_a_run_without_odometry_has_the_true_way_with_its_closures() -> None:
     story = RunSummary.of("blind", {**summary(), "glimpses": []}, TRUTH)
-    stamps_ns, true = story.true_way()
+    stamps_ns, true = story.true_trajectory()
     made = scene(story, stamps_ns, {"true": true}, None)
     assert [way["name"] for way in made["ways"]] == ["truth"] and made["objects"] == []
     assert len(made["closures"][0]["keys"]) == 4
