@@ -28,7 +28,7 @@ def main() -> None:
     for detector in (boxes, masks):
         result = register(*pictures, camera, detector=detector)
         answer = f"refused: {result.reason}" if result.T_1_2 is None else f"moved by {result.T_1_2[:3, 3].round(3)} m"
-        print(f"{detector.__name__}: {answer}, {result.evidence.get('explained', 0):.0f} objects explained")
+        print(f"{detector.__name__}: {answer}, {result.evidence.get('matched', 0):.0f} objects matched")
 
 
 if __name__ == "__main__":

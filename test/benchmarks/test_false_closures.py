@@ -23,7 +23,7 @@ def beside(metres: float) -> np.ndarray:
 
 
 def closure(metres: float, objects: int) -> LoopClosure:
-    evidence = {"explained": float(objects)}
+    evidence = {"matched": float(objects)}
     T = beside(metres)
     return LoopClosure(from_ns=0, to_ns=10**8, T_from_to=T, covariance=np.eye(6), labels=(), evidence=evidence)
 

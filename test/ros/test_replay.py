@@ -159,8 +159,9 @@ def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, s
     words = ("offline", str(kitchen), "--model", str(model), "--set", "detector.threshold=0.4", "--max-frames", "60")
     objreg(fresh, *words, "--json", str(tmp_path / "out.json"))
     offline = json.loads((tmp_path / "out.json").read_text())["constraints"]
-    live = [from_msg.loop_closure(message) for message in fresh.received["constraints"]]
     expected = [(c["from_ns"], c["to_ns"]) for c in offline]
+    fresh.wait_for(lambda: len(fresh.received["constraints"]) >= len(expected), what="the constraints of the replay")
+    live = [from_msg.loop_closure(message) for message in fresh.received["constraints"]]
     assert expected and [(c.from_ns, c.to_ns) for c in live] == expected
     for mine, theirs in zip(live, offline, strict=True):
         assert np.allclose(mine.T_from_to, theirs["T_from_to"], atol=1e-9)
