@@ -16,7 +16,7 @@ from objreg_ros.cli import NAME, SUMMARIES, group
 
 PAGE = Path(__file__).parent / "command-line.md"
 BEGIN, END = "<!-- made by docs/command_line.py -->", "<!-- end of what was made -->"
-OF_ALL = ("quiet", "verbose")  # which the page tells of once
+OF_ALL = ("quiet", "verbose")  # which the page describes once
 
 
 def page_text(page: str) -> str:

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The field's words: what the code and the documents of the product say no more."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+# The word, and where it has its common meaning: doors, rooms and books of simulated buildings, opencv's own names.
+OLD = {
+    r"hears?|heard|hearing": "receive",
+    r"ledger|receipts?": "accounting, acknowledgement",
+    r"Indoors|Inlet|Outlet|\w+Door|DoorParams": "IntraProcessBus, ValueQueue, LocalPublisher, NodeBase",
+    r"telling|tells": "report, state, know",
+    r"chains_disagree|few_objects_explained": "proposers_disagree, few_objects_matched",
+}
+PRODUCT = ("objreg_ros", "docs", "launch", "config")
+LEFT_OUT = ("docs/releases", "docs/tried.md", "objreg_ros/simulation")
+
+
+def lines_with(repository: Path, pattern: str) -> list[str]:
+    """Where a word is said in code, templates and documents of the product."""
+    said = re.compile(rf"\b(?:{pattern})\b")
+    found = []
+    for folder in PRODUCT:
+        for path in sorted((repository / folder).rglob("*")):
+            name = path.relative_to(repository).as_posix()
+            if path.suffix not in (".py", ".md", ".j2", ".yaml") or name.startswith(LEFT_OUT):
+                continue
+            lines = path.read_text(encoding="utf-8").splitlines()
+            found += [f"{name}:{k}: {line.strip()}" for k, line in enumerate(lines, 1) if said.search(line)]
+    return found
+
+
+@pytest.mark.parametrize("pattern", OLD)
+def test_an_old_word_is_said_no_more(repository: Path, pattern: str) -> None:
+    assert not lines_with(repository, pattern), f"say: {OLD[pattern]}"
+
+
+def test_a_word_that_is_said_is_found(repository: Path) -> None:
+    assert lines_with(repository, "NodeBase")
