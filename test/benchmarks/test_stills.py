@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -46,3 +47,27 @@ def test_depth_is_left_beside_colour_where_that_is_asked() -> None:
 
     image = SimpleNamespace()
     assert Unturned().register(image) is image
+
+
+def test_stills_of_a_kitchen_close_no_less_where_depth_is_brought_upon_colour(shared: Path) -> None:
+    from frame_pairs import Truths, draw_pairs
+    from pairs import Ours
+    from sources import Reading, detector_of, read_source
+
+    from objreg_ros.keyframes.frame_window import FrameWindow
+    from objreg_ros.keyframes.fusion import fuse
+    from objreg_ros.registration.params import RegistrarParams
+
+    params, accepted = RegistrarParams(), {}
+    detector = detector_of(str(shared / "models/ssd_mobilenet_v1_coco_int8.onnx"), 0.4)
+    for registered in (True, False):
+        reading = Reading(every=12, registered=registered)
+        with read_source(shared / "data/redkitchen_a", detector, 1, reading=reading) as source:
+            stills = [fuse(FrameWindow.of(frame), params) for frame in source.frames]
+            seen = [still for still in stills if still.objects and source.truth.at(still.stamp_ns) is not None]
+            truths = Truths(seen, [source.truth.at(still.stamp_ns) for still in seen], params)
+            ours, pairs = Ours(seen, params), draw_pairs(truths, len(seen), 30, 19)
+        rows = [ours(pair) for pair in pairs]
+        accepted[registered] = sum(row.accepted for row in rows)
+        assert all(row.within((8.0, 15.0)) for row in rows if row.accepted)
+    assert accepted[True] >= 20 and accepted[True] >= 0.9 * accepted[False]  # one pair of ten is chance
