@@ -104,7 +104,7 @@ def guarded(command: click.Command) -> click.Command:
 
 def require_apart(command: click.Command, given: Mapping[str, Any]) -> None:
     """ValueError for an output that is an input, lies in one or is another output; OSError for one that cannot be."""
-    outputs = list(_outputs(command, given))
+    outputs = [(_named(parameter), output) for parameter, output in _outputs(command, given)]
     inputs = list(_inputs(command, given)) if outputs else []
     for (name, output), (other, again) in combinations(outputs, 2):
         if _is_within(output, again):
@@ -115,15 +115,22 @@ def require_apart(command: click.Command, given: Mapping[str, Any]) -> None:
                 raise ValueError(
                     f"{name}: expected a place apart from all that is read, got {output}, of {other}; choose another"
                 )
+    for parameter, output in _outputs(command, given):
         if not output.is_dir():
-            require_writable(name, output)
+            require_writable(_named(parameter), _first_missing(output) if parameter.type.dir_okay else output)
 
 
-def _outputs(command: click.Command, given: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:
+def _first_missing(folder: Path) -> Path:
+    """The outermost folder that is made to make a folder; itself where the one above exists."""
+    return folder if folder.parent.exists() else _first_missing(folder.parent)
+
+
+def _outputs(command: click.Command, given: Mapping[str, Any]) -> Iterator[tuple[Any, Path]]:
+    """Each parameter that names an output, and the output."""
     for parameter in command.params:
         value = given.get(parameter.name or "")
         if isinstance(parameter.type, OutputPath) and value not in (None, STANDARD_OUTPUT):
-            yield _named(parameter), value
+            yield parameter, value
 
 
 def _inputs(command: click.Command, given: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:

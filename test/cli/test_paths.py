@@ -182,6 +182,23 @@ def test_a_file_that_can_be_written_is_not_touched(tmp_path: Path) -> None:
     assert (tmp_path / "old.html").read_text() == "old"
 
 
+@pytest.mark.parametrize(
+    ("name", "option"), [("demo", "out"), ("simulate", "out"), ("convert", "out"), ("batch", "out")]
+)
+def test_a_folder_is_made_with_those_above_it(name: str, option: str, tmp_path: Path) -> None:
+    require_apart(commands()[name], {option: tmp_path / "none/yet/here"})
+    assert not (tmp_path / "none").exists()
+    (tmp_path / "a_file").touch()
+    with pytest.raises(OSError, match=r"expected a"):
+        require_apart(commands()[name], {"out": tmp_path / "a_file/yet/here"})
+
+
+def test_a_folder_and_a_file_beside_it_are_two_outputs(tmp_path: Path) -> None:
+    require_apart(commands()["demo"], {"out": tmp_path / "none/demo"})
+    (tmp_path / "none").mkdir()
+    require_apart(commands()["offline"], {"tum": tmp_path / "none/a.tum", "json_file": tmp_path / "none/a.json"})
+
+
 def test_a_file_in_no_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a_file").touch()
     for place in (tmp_path / "nowhere/x", tmp_path / "a_file/x"):
