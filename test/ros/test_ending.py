@@ -80,7 +80,8 @@ def test_frames_of_hundreds_of_objects_hold_up_neither_a_registrar_nor_its_end(f
         tell(fresh, one, {0: "cup"})
         assert fresh.answer("registrar", one.stamp_ns) == "published"
     tell(fresh, crowds[3], {0: "cup"})
-    assert fresh.stop("registrar") == 0
+    code = fresh.stop("registrar")
+    assert code == 0, fresh.log("registrar")
     with closing(Store(store, read_only=True)) as stored:
         kept = [len(stored.keyframe(number).objects) for number in stored.keyframe_ids()]
     assert len(kept) >= 3 and set(kept) == {OBJECTS}  # of the last frame nothing is known: it may be on its way

@@ -44,6 +44,9 @@ def settle() -> None:
     gc.freeze()
 
 
+UNCONVERTED = "Unable to convert call argument"  # what pybind11 makes of a signal while rclpy converts a large message
+
+
 class FirstSignal:
     """A handler that raises KeyboardInterrupt once: who presses Ctrl-C again does not interrupt what is still written.
 
@@ -92,6 +95,10 @@ def shutdown_as_interrupt() -> Iterator[None]:
         raise KeyboardInterrupt from error
     except (rclpy_implementation.RCLError, NotInitializedException) as error:
         if rclpy.ok():
+            raise
+        raise KeyboardInterrupt from error
+    except RuntimeError as error:
+        if rclpy.ok() or UNCONVERTED not in str(error):
             raise
         raise KeyboardInterrupt from error
 

@@ -108,3 +108,19 @@ def test_all_threads_of_a_node_share_a_few_arenas_of_the_allocator(repository: P
         return told.count("<heap nr=")
 
     assert arenas("shared") < arenas("as they come")
+
+
+@pytest.mark.parametrize(
+    ("is_up", "text", "expected"),
+    [
+        (False, "Unable to convert call argument '0' to Python object", KeyboardInterrupt),
+        (True, "Unable to convert call argument '0' to Python object", RuntimeError),
+        (False, "a bug", RuntimeError),
+    ],
+)
+def test_a_signal_while_a_message_is_converted_is_an_interrupt_and_a_bug_is_none(
+    is_up: bool, text: str, expected: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("objreg_ros.bridge.node.lifetime.rclpy.ok", lambda: is_up)
+    with pytest.raises(expected), shutdown_as_interrupt():
+        raise RuntimeError(text)
