@@ -8,6 +8,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "objreg_ros"
+PACKAGES = ("objreg_ros", "objreg_mapper", "objreg_tools")
 HOME = "https://objreg-ros.invalid"  # where the repository is hosted
 
 
@@ -49,8 +50,8 @@ setup(
     ],
     maintainer="objreg_ros maintainers",
     maintainer_email="maintainers@objreg-ros.invalid",
-    packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "report/templates/*"]},
+    packages=find_packages(include=[*PACKAGES, *(f"{package}.*" for package in PACKAGES)]),
+    package_data={package: ["py.typed", "report/templates/*"] for package in PACKAGES},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml", "LICENSE"]),
@@ -59,30 +60,28 @@ setup(
         *files_below("models"),
     ],
     python_requires=">=3.11",
+    # What the robot's nodes and the library need: objreg_ros, and objreg_mapper but for its solver.
     install_requires=[
         "setuptools",
-        "click>=8.1",
-        "jinja2>=3.1",
         "numba>=0.59",
         "numpy>=1.26",
         "onnxruntime>=1.17",
-        "open3d>=0.18",
         "opencv-python-headless>=4.6",
         "pillow>=9.4",
         "pyyaml>=6",
-        "rosbags>=0.11",
         "scipy>=1.11",
-        "tqdm>=4.64",
     ],
     extras_require={
-        # What only the demo's picture of the way and the figures of benchmarks/ draw with; a robot does without. The
-        # simulator itself needs nothing that a robot has not.
-        "simulation": ["matplotlib>=3.6"],
+        # objreg_tools: the command `objreg`, recordings, reports, the simulator.
+        "tools": ["click>=8.1", "jinja2>=3.1", "rosbags>=0.11", "tqdm>=4.64"],
+        # The founding method, `method: paper`, is Open3D's ICP.
+        "paper": ["open3d>=0.18"],
         # The mapper, and the corrected trajectory of a report. Its wheel asks for pytest 9, which the launch_testing of
         # Ubuntu does not go with: on a robot, `pip install --no-deps gtsam`.
         "mapper": ["gtsam>=4.3"],
-        # The parts of a report that one can turn about. Without it the report has its flat pictures, and says so.
-        "report": ["plotly>=5.9"],
+        # The 3D parts of a report, and the demo's picture of the trajectory. Without it the report has its flat
+        # pictures, and says so.
+        "report": ["matplotlib>=3.6", "plotly>=5.9"],
         # `objreg batch`: Dask's processes and clusters, and Parquet.
         "batch": ["distributed>=2024.1", "pyarrow>=14"],
         # `--rerun`: a run as a recording for the Rerun viewer.
@@ -95,17 +94,17 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            "objreg = objreg_ros.__main__:main",
-            "objreg_graph = objreg_ros.graph:main",
+            "objreg = objreg_tools.__main__:main",
+            "objreg_graph = objreg_tools.graph:main",
             "detector = objreg_ros.detector.node:main",
             "segmenter = objreg_ros.segmenter.node:main",
             "registrar = objreg_ros.registrar.node:main",
             "keyframer = objreg_ros.keyframes.node:main",
-            "mapper = objreg_ros.mapper.node:main",
-            "objreg_to_rtabmap = objreg_ros.adapters.rtabmap:main",
-            "objreg_to_lio_sam = objreg_ros.adapters.lio_sam:main",
-            "objreg_to_hydra = objreg_ros.adapters.hydra:main",
-            "objreg_to_g2o = objreg_ros.adapters.g2o:main",
+            "mapper = objreg_mapper.node:main",
+            "objreg_to_rtabmap = objreg_mapper.adapters.rtabmap:main",
+            "objreg_to_lio_sam = objreg_mapper.adapters.lio_sam:main",
+            "objreg_to_hydra = objreg_mapper.adapters.hydra:main",
+            "objreg_to_g2o = objreg_mapper.adapters.g2o:main",
         ],
     },
     zip_safe=False,

@@ -101,9 +101,9 @@ class Called(Siege):
             self.tally.find(seed, "hang", f"an answer of ~/{name}: after {spent:.0f} s", "")
         return answer.result() if answer.done() else None
 
-    def settle_all(self, answers: Sequence[Any], seconds: float = ANSWER_S) -> None:
+    def settle_all(self, answers: Sequence[Any], seconds: float | None = None) -> None:
         """Wait until all have come, for a time, while the node lives."""
-        until = time.monotonic() + seconds
+        until = time.monotonic() + (ANSWER_S if seconds is None else seconds)
         while not all(one.done() for one in answers) and time.monotonic() < until and self._alive():
             self.graph.executor.spin_once(timeout_sec=PACE_S)
 

@@ -23,10 +23,10 @@ from attacked_files import borrowed, write_store
 from click.testing import CliRunner
 from trials import PATIENCE_S, Attempt, LateError, OutsideError, Target, WrongAnswerError
 
-from objreg_ros.cli import download as downloads
-from objreg_ros.cli import group
-from objreg_ros.cli.fetch_model import command as fetch_model
-from objreg_ros.cli.paths import OutputPath
+from objreg_tools.cli import download as downloads
+from objreg_tools.cli import group
+from objreg_tools.cli.commands.fetch_model import command as fetch_model
+from objreg_tools.cli.paths import OutputPath
 
 # -------------------------------------------------------------------------------------------------------------- outputs
 
@@ -41,7 +41,7 @@ class Inputs:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         folder.mkdir()
-        recording = borrowed("recording/folders.py").tum_folder(folder / RECORDED, frames=2)
+        recording = borrowed("recording/sample_folders.py").tum_folder(folder / RECORDED, frames=2)
         self.recording = Path(recording)
         self.store, self.run, self.settings = folder / "place.db", folder / "run.json", folder / "settings.yaml"
         write_store(self.store)

@@ -26,13 +26,14 @@ from rosbags.rosbag2 import StoragePlugin
 from store import make_keyframe
 from trials import Attempt, Target, WrongAnswerError
 
-from objreg_ros.data import ColourImage, LoopClosure
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.images import ColourImage
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.recording.opening import open_recording
-from objreg_ros.recording.writer import write_rosbag2
+from objreg_tools.recording.opening import open_recording
+from objreg_tools.recording.rosbag.writer import write_rosbag2
 
 TESTS = Path(__file__).resolve().parents[1] / "test"
 KEYFRAMES = 3
@@ -151,7 +152,7 @@ def _files(path: Path) -> list[Path]:
 
 
 def _write_recording(kind: str, path: Path) -> Path:
-    folders = borrowed("recording/folders.py")
+    folders = borrowed("recording/sample_folders.py")
     path.mkdir()
     if kind == "tum":
         return Path(folders.tum_folder(path / "walk"))

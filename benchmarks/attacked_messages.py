@@ -23,19 +23,11 @@ from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import String
 from trials import Attempt, Target, WrongAnswerError
 
-from objreg_ros.bridge.messages import from_msg, to_msg
-from objreg_ros.data import (
-    ColourImage,
-    DepthImage,
-    Detections,
-    Frame,
-    Intrinsics,
-    LoopClosure,
-    ObjectCloud,
-    PointCloud,
-    View,
-)
-from objreg_ros.data import Odometry as OdometryWord
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers, motion_from_msg, to_msg
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Frame, ObjectCloud, View
+from objreg_ros.data.frames import Odometry as OdometryWord
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics, PointCloud
 from objreg_ros.geometry import back_project
 from objreg_ros.registrar.warm import drawn
 from objreg_ros.segmenter.sensor.organise import organise
@@ -223,8 +215,8 @@ def from_msg_copy(message: Any) -> Any:
 def written(message: Any, stamp_ns: int | None = None) -> Any:
     """The message as another node would get it; WrongAnswerError if its stamp is another by then."""
     got = deserialize_message(serialize_message(message), type(message))
-    if stamp_ns is not None and from_msg.stamp_ns(got) != stamp_ns:
-        raise WrongAnswerError(f"the stamp {stamp_ns} ns was written as {from_msg.stamp_ns(got)} ns")
+    if stamp_ns is not None and headers.stamp_ns(got) != stamp_ns:
+        raise WrongAnswerError(f"the stamp {stamp_ns} ns was written as {headers.stamp_ns(got)} ns")
     return got
 
 
@@ -246,14 +238,14 @@ def use_depth(message: Any, info: Any, colour: Any) -> None:
 
 def use_info(info: Any) -> None:
     """As every node reads a camera."""
-    from_msg.is_calibrated(info)
-    written(to_msg.camera_info(from_msg.intrinsics(info), from_msg.stamp_ns(info), "camera"))
+    camera_from_msg.is_calibrated(info)
+    written(to_msg.camera_info(camera_from_msg.intrinsics(info), headers.stamp_ns(info), "camera"))
 
 
 def use_cloud(message: Any, info: Any) -> None:
     """As the segmenter reads a cloud."""
     word = from_msg.point_cloud(message)
-    depth = organise(word, from_msg.camera_of_cloud(info, word))
+    depth = organise(word, camera_from_msg.camera_of_cloud(info, word))
     if depth.depth.size < MOST_WRITTEN:
         written(to_msg.depth_image(depth), word.stamp_ns)
 
@@ -268,10 +260,10 @@ def use_detections(message: Any, said: Any) -> None:
 
 def use_odometry(before: Any, after: Any) -> None:
     """As registrar and mapper read odometry."""
-    words = [from_msg.odometry(before), from_msg.odometry(after)]
+    words = [motion_from_msg.odometry(before), motion_from_msg.odometry(after)]
     between = (words[0].stamp_ns + words[1].stamp_ns) // 2
-    T = from_msg.pose_at(between, words)
-    from_msg.level_gravity(between, words)
+    T = motion_from_msg.pose_at(between, words)
+    motion_from_msg.level_gravity(between, words)
     if not np.isfinite(T).all():
         raise WrongAnswerError(f"a pose between two is {T.tolist()}")
     written(to_msg.odometry(words[0]), words[0].stamp_ns)
@@ -287,7 +279,7 @@ def use_constraint(message: Any) -> None:
 def use_frame(objects: Any, view: Any, info: Any, gravity: Any, said: Any, before: Any, after: Any) -> None:
     """As the registrar reads a frame, and as the segmenter writes it."""
     names = from_msg.labels(said)
-    words = [from_msg.odometry(before), from_msg.odometry(after)]
+    words = [motion_from_msg.odometry(before), motion_from_msg.odometry(after)]
     frame = from_msg.frame(objects, view, info, gravity, names, words)
     written(to_msg.objects(frame, names), frame.stamp_ns)
     for message in (to_msg.view(frame), to_msg.view_camera_info(frame), to_msg.gravity(frame)):

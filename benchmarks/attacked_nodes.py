@@ -23,7 +23,7 @@ from attacked_files import borrowed
 from trials import GREED_MB, NoTrialError, Tally
 
 from objreg_ros.bridge.messages import to_msg
-from objreg_ros.bridge.messages.from_msg import stamp_ns as stamp_of
+from objreg_ros.bridge.messages.headers import stamp_ns as stamp_of
 from objreg_ros.geometry import back_project
 
 SHARES = {"detector": 1.0, "segmenter": 1.0, "registrar": 1.0, "mapper": 0.7, "keyframer": 0.7}  # of the time

@@ -28,9 +28,9 @@ from objreg_ros import limits
 from objreg_ros.memory import compact
 from objreg_ros.memory.compact import pack_keyframe, unpack_keyframe
 from objreg_ros.registrar.exchange import Exchange
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.summary import DELIVERY, REQUEST, SUMMARY, Name, Request, pack_request
-from objreg_ros.registration.params import RegistrarParams
 
 PREFIX = struct.Struct("<3sBII")  # kind, format, checksum of all that follows, bytes of the unpacked body
 FORMAT = 1

@@ -22,16 +22,16 @@ from edits import edited, edited_text
 from mutation import flipped, other_float, other_int
 from trials import Attempt, Target, WrongAnswerError
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.cli.batch_work import BatchWork
-from objreg_ros.cli.recorded import Asked
-from objreg_ros.cli.settings import read_settings
-from objreg_ros.mapper import saved
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.batch.batch_page import batch_page
-from objreg_ros.report.batch.batch_rows import Row
-from objreg_ros.report.batch.batch_tables import batch_tables
+from objreg_mapper import saved
+from objreg_mapper.params import MapperParams
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.bridge.messages import from_msg, motion_from_msg
+from objreg_tools.cli.batch_work import BatchWork
+from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.settings import read_settings
+from objreg_tools.report.batch.batch_page import batch_page
+from objreg_tools.report.batch.batch_rows import Row
+from objreg_tools.report.batch.batch_tables import batch_tables
 
 POSES = 24
 BOMB = 1 << 30  # bytes of a member that unpacks from a thousandth of it
@@ -118,7 +118,7 @@ def saved_map_attempt(folder: Path) -> Attempt:
 def _graph() -> PoseGraph:
     graph = PoseGraph()
     for k in range(POSES):
-        graph.add_odometry(from_msg.odometry(odometry_message((1 + k) * SECOND, 0.3 * k)))
+        graph.add_odometry(motion_from_msg.odometry(odometry_message((1 + k) * SECOND, 0.3 * k)))
     for k in range(0, POSES - 9, 3):
         tie = from_msg.loop_closure(constraint_message((1 + k) * SECOND, (9 + k) * SECOND, 2.4))
         assert graph.add_closure(tie)

@@ -33,16 +33,17 @@ from attacked_messages import (
 from mutation import mutated
 from trials import Attempt, Target, WrongAnswerError
 
+from objreg_mapper.optimisation.incremental import load
+from objreg_mapper.pose_graph import PoseGraph
 from objreg_ros import share
-from objreg_ros.bridge.messages import from_msg, to_msg
-from objreg_ros.data import DepthImage, Detections, Frame, Intrinsics
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, motion_from_msg, to_msg
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.mapper.incremental import load
-from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.doubts import range_doubt, registration_doubt
@@ -90,7 +91,7 @@ def _depth(message: Any, info: Any, colour: Any) -> DepthImage:
     if not hasattr(message, "point_step"):
         return from_msg.depth_image(message, info, colour)
     cloud = from_msg.point_cloud(message)
-    return organise(cloud, from_msg.camera_of_cloud(info, cloud))
+    return organise(cloud, camera_from_msg.camera_of_cloud(info, cloud))
 
 
 def _segment(segmenter: Segmenter, detections: Detections, depth: DepthImage, names: dict[int, str]) -> None:
@@ -154,7 +155,7 @@ def map_attempt(_: Path) -> Attempt:
         for k, message in enumerate(way):
             if k == spoilt_way and draw.random() < 0.5:
                 message = _with_stamp(mutated(draw, message), (1 + k) * SECOND)
-            for word in _readable(from_msg.odometry, message):
+            for word in _readable(motion_from_msg.odometry, message):
                 graph.add_odometry(word)
         for message in (mutated(draw, draw.choice(ties)), ties[0], mutated(draw, draw.choice(ties)), ties[-1]):
             for word in _readable(from_msg.loop_closure, message):

@@ -25,14 +25,14 @@ from typing import Any
 import click
 import pyarrow.parquet
 
-from objreg_ros.cli.batch_work import BatchWork
-from objreg_ros.cli.recorded import Asked
-from objreg_ros.cli.settings import read_settings
-from objreg_ros.cli.simulate import camera_of, sensors_of
-from objreg_ros.report.batch.batch_rows import Row
-from objreg_ros.report.batch.batch_tables import batch_tables
-from objreg_ros.simulation.write import simulate
-from objreg_ros.workers import Done, spread
+from objreg_tools.cli.batch_work import BatchWork
+from objreg_tools.cli.commands.simulate import camera_of, sensors_of
+from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.settings import read_settings
+from objreg_tools.report.batch.batch_rows import Row
+from objreg_tools.report.batch.batch_tables import batch_tables
+from objreg_tools.simulation.write import simulate
+from objreg_tools.workers import Done, spread
 
 HEAD = f"{'workers':16} {'s':>8} {'times':>6} {'recording, s':>13} {'constraints':>12}  same"
 TABLES = ("constraints", "refusals")

@@ -13,17 +13,19 @@ import numpy as np
 from peers import Peer
 from sources import Source
 
-from objreg_ros.data import UNTRIED, Array, Frame, LoopClosure, Odometry
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import UNTRIED, LoopClosure
+from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.geometry import inverse, rotation_angle
-from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.exports.export import constraint
-from objreg_ros.report.run.revisits import Revisit, Seen, recall_by_view_change, revisits
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
-from objreg_ros.truth import FALSE, LOOSE, Truth, within
+from objreg_tools.report.exports.export import constraint
+from objreg_tools.report.run.revisits import Revisit, Seen, recall_by_view_change, revisits
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.truth import FALSE, LOOSE, Truth, within
 
 GAP_NS = 2_000_000_000  # what is nearer in time is no loop
 TOLERANCE_NS = 1_000_000_000  # a keyframe spans up to a second

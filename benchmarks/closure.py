@@ -37,9 +37,9 @@ from sources import NO_JITTER, Jitter, Source, detector_of, read_source
 
 import objreg_ros
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.simulation.scenarios import SCENARIOS
-from objreg_ros.simulation.write import simulate
-from objreg_ros.workers import spread
+from objreg_tools.simulation.scenarios import SCENARIOS
+from objreg_tools.simulation.write import simulate
+from objreg_tools.workers import spread
 
 OURS, ALONE, ORACLE = "objreg", "objreg, pairs alone", "oracle"
 QUICK = {"frames": 300, "names": ("orb_pnp",), "candidates": 1}
@@ -149,7 +149,7 @@ def _remove(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
+def plans(texts: Sequence[str]) -> list[tuple[str, int]]:
     """``loop:0,1`` as (loop, 0), (loop, 1); `click.BadParameter` for what is no scenario or no seed."""
     found = []
     for text in texts:
@@ -234,7 +234,7 @@ def main(
 ) -> None:
     """Compare loop closure on RECORDINGS that have ground truth."""
     options |= quick_values(context, quick, QUICK if recordings else QUICK | {"scenarios": QUICK_STORY})
-    told = stories(options["scenarios"])
+    told = plans(options["scenarios"])
     if not recordings and not told:
         raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     detector = detector_of(options["model"], options["threshold"])
@@ -242,7 +242,7 @@ def main(
         detector, options["names"], options["candidates"], options["seed"], options["drift"], options["jitter"]
     )
     paths = [partial(Path, path) for path in recordings]
-    paths += [partial(simulated, keep, *story, options["frames"]) for story in told]
+    paths += [partial(simulated, keep, *plan, options["frames"]) for plan in told]
     names = [*(path.name for path in recordings), *(f"{name}_{seed}" for name, seed in told)]
     _require_own_names(names)
     work = partial(_compared, asked=asked, frames=options["frames"], keep=keep, again=again)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import is_rigid, pose
 
 Peer = Callable[[Array, Array], Array]

@@ -25,9 +25,9 @@ from sources import Source, detector_of, read_source
 
 from objreg_ros.memory.compact import MOST_BYTES, pack_keyframe, unpack_keyframe
 from objreg_ros.memory.descriptor import describe
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.truth import LOOSE
+from objreg_tools.truth import LOOSE
 
 UNLIMITED = 10**9  # bytes
 

@@ -35,11 +35,12 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPOSITORY))
 
 from objreg_ros import share  # noqa: E402
-from objreg_ros.cli.fetch_model import MODELS  # noqa: E402
-from objreg_ros.data import Array, ColourImage, Detections  # noqa: E402
+from objreg_ros.data.checked import Array  # noqa: E402
+from objreg_ros.data.images import ColourImage, Detections  # noqa: E402
 from objreg_ros.detector.boxes import iou  # noqa: E402
 from objreg_ros.detector.detector import Detector  # noqa: E402
 from objreg_ros.detector.params import DetectorParams  # noqa: E402
+from objreg_tools.cli.commands.fetch_model import MODELS  # noqa: E402
 from training.validation import EVERYTHING, LARGE, RANKING, REASONABLE, Labelled, look, pictures, precisions  # noqa: E402
 
 SHARED = Path(os.environ.get("OBJREG_SHARED", REPOSITORY.parent / "shared"))

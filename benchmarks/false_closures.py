@@ -28,15 +28,15 @@ from typing import Any, NamedTuple
 import click
 from sources import detector_of, read_source
 
-from objreg_ros.cli.simulate import camera_of, distortion_of, sensors_of
-from objreg_ros.data import UNTRIED, LoopClosure, Rejected
+from objreg_ros.data.closures import UNTRIED, LoopClosure, Rejected
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.simulation.camera import CAMERAS, SENSORS
-from objreg_ros.simulation.scenarios import SCENARIOS
-from objreg_ros.simulation.write import simulate
-from objreg_ros.truth import LOOSE, Truth, summarise, within
-from objreg_ros.workers import spread
+from objreg_tools.cli.commands.simulate import camera_of, distortion_of, sensors_of
+from objreg_tools.simulation.scenarios import SCENARIOS
+from objreg_tools.simulation.sensors.camera import CAMERAS, SENSORS
+from objreg_tools.simulation.write import simulate
+from objreg_tools.truth import LOOSE, Truth, summarise, within
+from objreg_tools.workers import spread
 
 EAGER = {"candidates": 10, "closures": 10, "thin_seconds": 0.2, "threads": 1}
 STORIES = (
@@ -100,18 +100,18 @@ def _told(scenario: str, seed: str, *more: str) -> Told:
         raise ValueError(f"settings are sensor={'|'.join(SENSORS)}, lens= and those of the rig")
     if "lens" in settings:
         settings["distortion"] = distortion_of(settings.pop("lens"))
-    story = Told(scenario, int(seed), camera, stress, sensor, tuple(f"rig.{k}={v}" for k, v in settings.items()))
-    sensors_of(camera_of(camera, None), stress, story.rig, sensor)  # refuses what is out of range
-    return story
+    plan = Told(scenario, int(seed), camera, stress, sensor, tuple(f"rig.{k}={v}" for k, v in settings.items()))
+    sensors_of(camera_of(camera, None), stress, plan.rig, sensor)  # refuses what is out of range
+    return plan
 
 
-def measure(story: Told, frames: int, model: str) -> dict[str, Any]:
+def measure(plan: Told, frames: int, model: str) -> dict[str, Any]:
     """The figures of one recording, which is gone afterwards."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording"
-        sensors = sensors_of(camera_of(story.camera, None), story.stress, story.rig, story.sensor)
-        simulate(path, story.scenario, story.seed, frames, sensors=sensors, jpeg=True, threads=1)
-        with read_source(path, detector_of(model), story.seed) as source:
+        sensors = sensors_of(camera_of(plan.camera, None), plan.stress, plan.rig, plan.sensor)
+        simulate(path, plan.scenario, plan.seed, frames, sensors=sensors, jpeg=True, threads=1)
+        with read_source(path, detector_of(model), plan.seed) as source:
             registrar = Registrar(RegistrarParams().replaced(**EAGER, **source.camera))
             outcomes = [*(registrar.process(frame) for frame in source.frames), registrar.finish()]
             registrar.close()
@@ -170,7 +170,7 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
 @click.command()
 @click.option(
     "--simulate",
-    "stories",
+    "plans",
     multiple=True,
     default=STORIES,
     show_default=True,
@@ -183,14 +183,14 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--processes", type=click.IntRange(min=1), default=2, show_default=True, help="Recordings at once.")
 @click.option("--scheduler", default="", metavar="tcp://HOST:PORT", help="A Dask cluster in place of this machine.")
-def main(stories: list[Told], frames: int, model: str, json_file: Path | None, processes: int, scheduler: str) -> None:
+def main(plans: list[Told], frames: int, model: str, json_file: Path | None, processes: int, scheduler: str) -> None:
     """Hold every keyframe of simulated recordings against ten others, and count what is falsely accepted."""
     rows: dict[str, dict[str, Any]] = {}
     click.echo(HEAD)
-    for done in spread(partial(measure, frames=frames, model=model), stories, processes, scheduler):
+    for done in spread(partial(measure, frames=frames, model=model), plans, processes, scheduler):
         rows[done.item.name] = done.result()
         click.echo(line(done.item.name, rows[done.item.name]))
-        rows = {story.name: rows[story.name] for story in stories if story.name in rows}  # whichever ended first
+        rows = {plan.name: rows[plan.name] for plan in plans if plan.name in rows}  # whichever ended first
         if json_file is not None:
             total = added(list(rows.values()))
             json_file.write_text(json.dumps({"frames": frames, "recordings": rows, "total": total}, indent=1))

@@ -15,9 +15,9 @@ from typing import Any
 
 from closers import TOLERANCE_NS
 
-from objreg_ros.data import LoopClosure
-from objreg_ros.report.run.revisits import VIEW_CHANGES, Revisit, Seen, revisit_of
-from objreg_ros.truth import FALSE, LOOSE, Truths, within
+from objreg_ros.data.closures import LoopClosure
+from objreg_tools.report.run.revisits import VIEW_CHANGES, Revisit, Seen, revisit_of
+from objreg_tools.truth import FALSE, LOOSE, Truths, within
 
 APART_NS = 2_000_000_000
 """Meetings are of one stretch if no more time is between one and the next."""

@@ -18,11 +18,11 @@ import numpy as np
 from sources import TRUE_BOXES, detector_of, read_source
 from tables import table_story
 
-from objreg_ros.data import Frame
+from objreg_ros.data.frames import Frame
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.simulation.write import write_story
+from objreg_tools.simulation.write import write_plan
 
 FRAMES = 180
 OBJECTS = 8
@@ -32,7 +32,7 @@ ROUNDS = 5  # every store has its turn in each, so that a machine that changes i
 def table_frames(folder: Path) -> list[Frame]:
     """The frames of one pass."""
     path = folder / "table"
-    write_story(path, table_story(OBJECTS, FRAMES, 0), "table", 0, jpeg=True, threads=os.cpu_count() or 1)
+    write_plan(path, table_story(OBJECTS, FRAMES, 0), "table", 0, jpeg=True, threads=os.cpu_count() or 1)
     with read_source(path, detector_of(TRUE_BOXES), 0) as source:
         return source.frames
 

@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import UNNAMED, Array
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import UNNAMED
 from objreg_ros.geometry import inverse, rotation_angle, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, prepare_sight
 from objreg_ros.registration.score.free_space import INLIERS
 from objreg_ros.registration.score.view_score import count_visibility

@@ -28,11 +28,11 @@ import click
 from latency import recorded
 from overload import Gauge, endless, unaccounted
 
-from objreg_ros.cli.live import START_S, private_environment
-from objreg_ros.cli.processes import Processes
-from objreg_ros.recording import open_recording
-from objreg_ros.recording.inputs import choose_inputs, parse_remaps
-from objreg_ros.recording.replay import graph_names
+from objreg_tools.cli.live import START_S, private_environment
+from objreg_tools.cli.processes import Processes
+from objreg_tools.recording import open_recording
+from objreg_tools.recording.inputs import choose_inputs, parse_remaps
+from objreg_tools.recording.replay import graph_names
 
 ROBOT, FLEET = "honest", "/fleet"
 NODES = "detector", "segmenter", "registrar", "mapper"
@@ -202,7 +202,7 @@ def measure(path: Path, seconds: float, kinds: tuple[str, ...], hz: float, folde
             more = {"registrar": ["-p", f"exchange:={FLEET}", "-p", f"store:={folder}/place.db"]}
             more["mapper"] = ["-p", f"graph_path:={folder}/map.g2o"]
             own = ["--ros-args", "-r", f"__ns:=/{ROBOT}", *more.get(name, [])]
-            processes.start(name, f"objreg_ros.{name}.node", own)
+            processes.start(name, "objreg_mapper.node" if name == "mapper" else f"objreg_ros.{name}.node", own)
         _wait_for_nodes(gauge, processes)
         context = multiprocessing.get_context("spawn")
         sent = context.Value("q", 0)

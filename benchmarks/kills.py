@@ -24,11 +24,12 @@ import click
 import numpy as np
 from tqdm import tqdm
 
-from objreg_ros.cli.live import private_environment
-from objreg_ros.cli.processes import Processes
-from objreg_ros.data import Odometry
+from objreg_ros.bridge.messages import headers
+from objreg_ros.data.frames import Odometry
 from objreg_ros.keyframes.warm import drawn
 from objreg_ros.memory.store import Store, StoreError
+from objreg_tools.cli.live import private_environment
+from objreg_tools.cli.processes import Processes
 
 SECOND = 1_000_000_000
 PERIOD_S, STEP_M = 0.15, 1.0  # between two frames
@@ -56,7 +57,7 @@ class Robot:
         import rclpy
         from sensor_msgs.msg import PointCloud2
 
-        from objreg_ros.bridge.messages import from_msg, to_msg
+        from objreg_ros.bridge.messages import to_msg
         from objreg_ros.bridge.node import qos
 
         rclpy.init(args=[])
@@ -66,7 +67,7 @@ class Robot:
         self.announced: set[int] = set()
         self._spin = rclpy.spin_once
         self._node.create_subscription(
-            PointCloud2, "landmarks", lambda m: self.announced.add(from_msg.stamp_ns(m)), qos.stage(depth=1000)
+            PointCloud2, "landmarks", lambda m: self.announced.add(headers.stamp_ns(m)), qos.stage(depth=1000)
         )
         self._send("labels", to_msg.labels(NAMES), qos.latched())
 

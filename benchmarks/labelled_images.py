@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, Detections, PointCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage, Detections, PointCloud
 from objreg_ros.segmenter.sensor.organise import organise
-from objreg_ros.simulation.render import Rendering, render
-from objreg_ros.simulation.scene import random_scene, random_view
+from objreg_tools.simulation.rendering.render import Rendering, render
+from objreg_tools.simulation.world.scene import random_scene, random_view
 
 LEAST_VISIBLE = 0.6  # of a simulated object's outline
 LEAST_PIXELS = 1000

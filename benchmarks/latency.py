@@ -28,10 +28,10 @@ import click
 import numpy as np
 from tables import RATE_HZ, table_story
 
-from objreg_ros.cli.live import STAGES, Live, Setup, run_live
-from objreg_ros.simulation.write import write_story
+from objreg_tools.cli.live import STAGES, Live, Setup, run_live
+from objreg_tools.simulation.write import write_plan
 
-PROGRAMS = {**{room: f"objreg_ros.{room}.node" for room in STAGES}, "graph": "objreg_ros.graph"}
+PROGRAMS = {**{room: f"objreg_ros.{room}.node" for room in STAGES}, "graph": "objreg_tools.graph"}
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -46,7 +46,7 @@ class Witness:
         from sensor_msgs.msg import CompressedImage
         from std_msgs.msg import Header
 
-        from objreg_ros.bridge.messages.from_msg import stamp_ns
+        from objreg_ros.bridge.messages.headers import stamp_ns
         from objreg_ros.bridge.node import qos
 
         self.seen: dict[int, float] = {}
@@ -184,7 +184,7 @@ def recorded(objects: int, frames: int, seed: int) -> Iterator[Path]:
     """The recording of a table, gone afterwards."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"table_{objects}")
-        write_story(path, table_story(objects, frames, seed), "table", seed, jpeg=True)
+        write_plan(path, table_story(objects, frames, seed), "table", seed, jpeg=True)
         yield path
 
 

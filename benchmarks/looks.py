@@ -12,19 +12,21 @@ from typing import Any
 import numpy as np
 from paper import UP, Stage, keyframe
 
-from objreg_ros.data import Array, DepthImage, Detections, Frame
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.geometry import pose
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.simulation import furniture
-from objreg_ros.simulation.light import looking
-from objreg_ros.simulation.objects import make_object
-from objreg_ros.simulation.params import StressParams
-from objreg_ros.simulation.render import render
-from objreg_ros.simulation.scene import furnished, number, place_on
+from objreg_tools.simulation.params import StressParams
+from objreg_tools.simulation.rendering.light import looking
+from objreg_tools.simulation.rendering.render import render
+from objreg_tools.simulation.world import furniture
+from objreg_tools.simulation.world.objects import make_object
+from objreg_tools.simulation.world.scene import furnished, number, place_on
 
 Look = tuple[str, int]  # the kind of object, and the room
 FOUR = ("cereal_box", "book", "keyboard", "bowl", "cap", "flashlight", "soda_can")

@@ -20,17 +20,19 @@ from map_peers import Dense, factors_of, values_of
 from sources import detector_of, read_source, with_drift
 from tqdm import tqdm
 
-from objreg_ros.data import UNNAMED, Array, Frame, LoopClosure
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import UNNAMED, Frame
 from objreg_ros.geometry import inverse, transform
 from objreg_ros.keyframes.frame_window import SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Keyframer
-from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.memory.landmarks import MIDDLE_WANDERS, RADIUS_M, Landmarks, Link, Merge
 from objreg_ros.memory.sighting import Sighting, sightings_of
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
-from objreg_ros.truth import Truth
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.truth import Truth
 
 LEAST_SIGMA_M = 0.005  # of an object's middle
 SHARES = np.array([0.5, 1.0]) * MIDDLE_WANDERS  # and of its extent, one sigma across the line of sight and along it

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from map_peers import PEERS, Dense, Solved
 
-from objreg_ros.data import Array
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
-from objreg_ros.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
+from objreg_mapper.params import MapperParams
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
 
 OURS, CLEAN_LM = "objreg", "GTSAM LM, right ones alone"
 SHARES, AGREEING = (0.1, 0.2, 0.3), (0.0, 0.1)

@@ -19,12 +19,14 @@ import numpy as np
 from sources import detector_of, read_source, with_drift
 from tqdm import tqdm
 
-from objreg_ros.data import Array, Frame, LoopClosure, Odometry
+from objreg_mapper.params import MapperParams
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.geometry import inverse, rotation_angle, vector_from_rotation
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
-from objreg_ros.truth import LOOSE, Truth, within
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.truth import LOOSE, Truth, within
 
 SEED = 1  # of the odometry with which closures are found
 PERFECT, OURS, ODOMETRY = "perfect constraints", "ours", "odometry alone"

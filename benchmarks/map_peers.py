@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import gtsam
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_mapper.optimisation.edges import Edges, edges_of, squared_residuals
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, pose
-from objreg_ros.mapper.edges import Edges, edges_of, squared_residuals
-from objreg_ros.mapper.pose_graph import PoseGraph
 
 HELD_SIGMA = 1e-6  # rad and m: the first node stays
 STAGE = 4.0  # Open3D's doubt shrinks by this factor from call to call

@@ -12,12 +12,12 @@ import numpy as np
 from map_peers import PEERS, Dense, factors_of, values_of
 from tqdm import tqdm
 
-from objreg_ros.data import Array
+from objreg_mapper.optimisation.edges import Edges, edges_of
+from objreg_mapper.optimisation.incremental import IncrementalGraph
+from objreg_mapper.optimisation.robust import RobustGraph
+from objreg_mapper.params import MapperParams
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse
-from objreg_ros.mapper.edges import Edges, edges_of
-from objreg_ros.mapper.incremental import IncrementalGraph
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.robust import RobustGraph
 
 START, LM, BELIEVED, ROBUST = "as the file has it", "GTSAM LM", "objreg, all believed", "objreg"
 IN_PLANE = [2, 3, 4]  # of [r t]: the turn and the position of a pose in the plane

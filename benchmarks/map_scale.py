@@ -14,9 +14,9 @@ from map_lies import error_of, filled, solved
 from map_peers import PEERS, Dense, Solved
 from tqdm import tqdm
 
-from objreg_ros.data import Array
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
+from objreg_tools.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
 
 BUILDING = WalkParams(step_m=0.27, corridor_m=10.0, corridors=8, false_share=0.05, lie_m=(0.1, 30.0))
 SHORT_M = 250.0  # what Open3D's dense optimiser can do

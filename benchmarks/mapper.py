@@ -38,11 +38,11 @@ import map_lies
 import map_limits
 import map_public
 import map_scale
-from closure import simulated, stories
+from closure import plans, simulated
 from map_peers import PEERS, chosen
 from tqdm import tqdm
 
-from objreg_ros.mapper.params import MapperParams
+from objreg_mapper.params import MapperParams
 
 KEPT = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "objreg_mapper"
 JSON = click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write figures here.")
@@ -119,7 +119,7 @@ def _compared(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _cases(recordings: tuple[Path, ...], scenarios: tuple[str, ...], frames: int, keep: Path) -> Iterator[Path]:
-    asked = stories(scenarios)
+    asked = plans(scenarios)
     if not recordings and not asked:
         raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     yield from recordings

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 from sources import detector_of, read_source
 
-from objreg_ros.data import Array, ObjectCloud, PointFlag
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import ObjectCloud, PointFlag
 from objreg_ros.geometry import transform
 
 LABELS = ("cup", "chair", "book")

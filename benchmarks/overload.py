@@ -33,12 +33,12 @@ import click
 import numpy as np
 from latency import Meter, recorded
 
-from objreg_ros.cli.live import STAGES, START_S, private_environment
-from objreg_ros.cli.processes import Processes
 from objreg_ros.memory.store import Store
-from objreg_ros.recording import open_recording
-from objreg_ros.recording.inputs import choose_inputs, parse_remaps
-from objreg_ros.recording.replay import graph_names
+from objreg_tools.cli.live import STAGES, START_S, private_environment
+from objreg_tools.cli.processes import Processes
+from objreg_tools.recording import open_recording
+from objreg_tools.recording.inputs import choose_inputs, parse_remaps
+from objreg_tools.recording.replay import graph_names
 
 WARM_UP = 1 / 3  # of the time: memory that is taken then is not counted as growth
 END_S = 120.0  # a node that has not ended by then is killed

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from frame_pairs import BINS, Pair
 
-from objreg_ros.data import Array
-from objreg_ros.truth import FALSE, LOOSE, STRICT, Error, within
+from objreg_ros.data.checked import Array
+from objreg_tools.truth import FALSE, LOOSE, STRICT, Error, within
 
 
 @dataclass

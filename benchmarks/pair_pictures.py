@@ -11,9 +11,10 @@ import numpy as np
 from frame_pairs import Pair
 from pair_figures import Row, is_wrong
 
-from objreg_ros.data import Array, DepthImage
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage
 from objreg_ros.geometry import back_project, transform
-from objreg_ros.truth import LOOSE
+from objreg_tools.truth import LOOSE
 
 MOST_FAILURES = 12  # that are drawn of one run
 

@@ -30,18 +30,20 @@ from pair_pictures import draw_failures
 from peers import PEERS, Answer, Peer, Shot, named
 from sources import Reading, Source, detector_of, read_source
 
-from objreg_ros.data import Array, Frame, Reason
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Reason
+from objreg_ros.data.frames import Frame
 from objreg_ros.geometry import back_project, pose_error
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Keyframer
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.score.view_score import LEAST_SCORE, verify
-from objreg_ros.truth import Truth
+from objreg_tools.truth import Truth
 
 QUICK = {"wanted": 15, "names": ("paper", "orb_pnp")}
 LAG_STEP_MS = 10

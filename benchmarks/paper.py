@@ -27,27 +27,29 @@ from pose_figures import SUCCESS
 from scipy.spatial import cKDTree
 from sources import SIMULATED
 
-from objreg_ros.data import Array, DepthImage, Detections, Frame
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.paper import register
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.propose.object_poses import from_shapes
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.simulation import furniture
-from objreg_ros.simulation.light import looking
-from objreg_ros.simulation.model import ObjectModel
-from objreg_ros.simulation.objects import make_object
-from objreg_ros.simulation.render import Rendering, render
-from objreg_ros.simulation.scene import Scene, furnished, number, place_on
-from objreg_ros.truth import within
+from objreg_tools.simulation.rendering.light import looking
+from objreg_tools.simulation.rendering.render import Rendering, render
+from objreg_tools.simulation.world import furniture
+from objreg_tools.simulation.world.model import ObjectModel
+from objreg_tools.simulation.world.objects import make_object
+from objreg_tools.simulation.world.scene import Scene, furnished, number, place_on
+from objreg_tools.truth import within
 
 ASIDE = 0.18  # m from the middle of the table, about which half a turn would look the same
 PAPER_SECONDS = (2.0, 4.0)  # what the document says of its time for a pair

@@ -15,7 +15,9 @@ import click
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, ObjectCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import ObjectCloud
+from objreg_ros.data.images import DepthImage
 from objreg_ros.geometry import back_project, pose, rotation_from_vector
 
 FEATURES = 1000  # of an image, at most

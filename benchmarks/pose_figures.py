@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose_error, transform, vector_from_rotation
-from objreg_ros.truth import within
+from objreg_tools.truth import within
 
 SUCCESS = (5.0, 2.0)  # degrees, centimetres
 

@@ -43,22 +43,22 @@ from paper import TABLE_1, Stage, keyframe
 from pose_figures import SUCCESS, error_at, grouped, judged, mean, median, nees, percentiles
 from sources import SIMULATED
 
-from objreg_ros.data import DepthImage, Detections
+from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.geometry import inverse, pose_error, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.warm import drawn
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.hypotheses import Hypothesis
 from objreg_ros.registration.propose.object_poses import from_shapes
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.simulation.camera import KINECT
-from objreg_ros.simulation.params import StressParams
-from objreg_ros.simulation.render import render
-from objreg_ros.truth import FALSE, within
+from objreg_tools.simulation.params import StressParams
+from objreg_tools.simulation.rendering.render import render
+from objreg_tools.simulation.sensors.camera import KINECT
+from objreg_tools.truth import FALSE, within
 
 CONDITIONS = {
     "clean": StressParams(),

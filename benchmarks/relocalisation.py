@@ -29,17 +29,19 @@ from typing import Any
 import click
 import cv2
 import numpy as np
-from closure import simulated, stories
+from closure import plans, simulated
 from command_line import quick_values
 from sources import detector_of, read_source
 
-from objreg_ros.data import UNNAMED, Array, Frame, LoopClosure
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import UNNAMED, Frame
 from objreg_ros.geometry import inverse, pose_error, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.keyframe import bounding_box
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.truth import FALSE, Truth, within
+from objreg_tools.truth import FALSE, Truth, within
 
 WITHIN_S = 5.0
 NEAR_M = 0.3  # an object that is known stands no farther from where it stood
@@ -129,7 +131,7 @@ def wake(
         for frame in begun_anew(frames):
             last = frame.stamp_ns - LATER_NS
             closures = registrar.process(frame).closures
-            row["closures"] += [told_of(one, truth) for one in closures if one.from_session != one.to_session]
+            row["closures"] += [begun_summary(one, truth) for one in closures if one.from_session != one.to_session]
             T = truth.at(last)
             if T is None:
                 continue
@@ -148,7 +150,7 @@ def wake(
     return row
 
 
-def told_of(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
+def begun_summary(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
     """What a closure to the earlier session says of itself, and its true error in degrees and centimetres."""
     evidence = {name: round(closure.evidence[name], 2) for name in ("odds", "agreeing") if name in closure.evidence}
     return evidence | {"error": truth.error(replace(closure, to_ns=closure.to_ns - LATER_NS))}
@@ -223,12 +225,12 @@ def main(
 ) -> None:
     """Measure and print; the figures are written after every recording."""
     options |= quick_values(context, quick, QUICK if recordings else QUICK | {"scenarios": ("loop:0",)})
-    told = stories(options["scenarios"])
+    told = plans(options["scenarios"])
     if not recordings and not told:
         raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     cv2.setNumThreads(1)
     paths = [partial(Path, path) for path in recordings]
-    paths += [partial(simulated, keep, *story, options["frames"]) for story in told]
+    paths += [partial(simulated, keep, *plan, options["frames"]) for plan in told]
     rows: dict[str, list[dict[str, Any]]] = {}
     click.echo(HEAD)
     for make in paths:

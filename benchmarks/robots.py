@@ -31,22 +31,24 @@ from map_limits import kept
 from sources import SIMULATED, detector_of, read_source
 from tqdm import tqdm
 
-from objreg_ros.data import Array, Frame, LoopClosure, Odometry
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.geometry import inverse
 from objreg_ros.keyframes.frame_window import Arrival
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Keyframer
-from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.memory.compact import pack_keyframe, unpack_keyframe
 from objreg_ros.registrar.exchange import Exchange
 from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.run.revisits import Seen
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
-from objreg_ros.simulation.write import simulate_fleet
-from objreg_ros.truth import FALSE, Truth, Truths, within
+from objreg_tools.report.run.revisits import Seen
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.simulation.write import simulate_fleet
+from objreg_tools.truth import FALSE, Truth, Truths, within
 
 PARAMS = RegistrarParams(seed=1).replaced(**SIMULATED)
 SEED = 1

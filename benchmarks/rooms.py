@@ -33,13 +33,15 @@ from typing import Any, NamedTuple, Protocol
 import click
 import cv2
 import numpy as np
-from closure import code, simulated, stories
+from closure import code, plans, simulated
 from command_line import quick_values
 from frame_pairs import Truths
 from sources import detector_of, read_source
 from tqdm import tqdm
 
-from objreg_ros.data import Array, Frame, LoopClosure
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Frame
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.keyframes.frame_window import SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
@@ -47,13 +49,13 @@ from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.run.revisits import Seen, overlap
-from objreg_ros.simulation.write import simulate
-from objreg_ros.truth import FALSE, LOOSE, Truth, within
+from objreg_tools.report.run.revisits import Seen, overlap
+from objreg_tools.simulation.write import simulate
+from objreg_tools.truth import FALSE, LOOSE, Truth, within
 
 FIRST_ROOM = 60_000  # the seed of the first of the other rooms
 FRAMES, RATE_HZ = 40, 5.0  # of a room: a frame a view
@@ -260,7 +262,7 @@ def main(
 ) -> None:
     """Measure and print."""
     options |= quick_values(context, quick, QUICK if recordings else QUICK | {"scenarios": ("loop:61000",)})
-    told = stories(options["scenarios"])
+    told = plans(options["scenarios"])
     if not recordings and not told:
         raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     cv2.setNumThreads(1)
@@ -268,7 +270,7 @@ def main(
     detector = detector_of(options["model"], options["threshold"])
     store = store_of_rooms(keep, options["rooms"], detector)
     paths = [partial(Path, path) for path in recordings]
-    paths += [partial(simulated, keep, *story, options["frames"]) for story in told]
+    paths += [partial(simulated, keep, *plan, options["frames"]) for plan in told]
     rows: dict[str, dict[str, Any]] = {}
     click.echo(HEAD)
     for make in paths:

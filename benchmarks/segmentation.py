@@ -30,7 +30,8 @@ import cv2
 import numpy as np
 from labelled_images import LabelledImage, Thing, detections, jittered, labelled_clouds, simulated_images
 
-from objreg_ros.data import Array, ObjectCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.segmenter.objects.boxes import pixel_boxes
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter

@@ -22,16 +22,17 @@ import click
 import numpy as np
 from tqdm import tqdm
 
-from objreg_ros.data import Array, DepthImage
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage
 from objreg_ros.geometry import inverse, vector_from_rotation
 from objreg_ros.segmenter.sensor.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
 from objreg_ros.segmenter.sensor.view import reduced_view, step_for
 from objreg_ros.sensor import depth_noise
-from objreg_ros.simulation.camera import CAMERAS, SENSORS
-from objreg_ros.simulation.params import RigParams
-from objreg_ros.simulation.rig import Motion, Rig
-from objreg_ros.simulation.scenarios import make_story
+from objreg_tools.simulation.params import RigParams
+from objreg_tools.simulation.scenarios import make_plan
+from objreg_tools.simulation.sensors.camera import CAMERAS, SENSORS
+from objreg_tools.simulation.sensors.rig import Motion, Rig
 
 RIGS = {
     "built well": RigParams(),
@@ -47,10 +48,10 @@ FIRST = 5  # frames before anything is remembered of a stream
 def frames_of(sensor: str, rig: RigParams, seed: int, count: int, rate: float) -> Iterator[tuple[DepthImage, Array]]:
     """The pictures of a camera that is carried through a room, and the true rotation (3,) rad of depth upon colour."""
     name, depth = SENSORS[sensor]
-    camera, story = CAMERAS[name], make_story("opposite", seed, count, rate)
-    cameras, motion = Rig(rig, camera, seed), Motion(story.T_world_camera, story.rate)
+    camera, plan = CAMERAS[name], make_plan("opposite", seed, count, rate)
+    cameras, motion = Rig(rig, camera, seed), Motion(plan.T_world_camera, plan.rate)
     for k in range(count):
-        seconds, scene = k / story.rate, story.scenes[int(story.scene_of[k])]
+        seconds, scene = k / plan.rate, plan.scenes[int(plan.scene_of[k])]
         seen = cameras.take(scene, motion, seconds, k, depth, threads=2)
         late = inverse(motion.at(seconds)) @ motion.at(seconds - 1e-3 * rig.lag_ms) @ cameras.T_colour_depth
         image = DepthImage(depth=seen.depth, rgb=seen.rgb, intrinsics=camera, stamp_ns=round(1e9 * seconds))

@@ -24,19 +24,19 @@ import click
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array
-from objreg_ros.simulation.camera import CAMERAS, KINECT, LENSES, SENSORS, ColourSensor
-from objreg_ros.simulation.light import looking
-from objreg_ros.simulation.mesh import Material, box
-from objreg_ros.simulation.noise import DepthSensor
-from objreg_ros.simulation.params import ColourParams, DepthParams, RigParams, StressParams
-from objreg_ros.simulation.raster import Projection
-from objreg_ros.simulation.render import Rendering, render, see
-from objreg_ros.simulation.rig import Motion, Rig
-from objreg_ros.simulation.scenarios import Story, make_story
-from objreg_ros.simulation.scene import Scene
-from objreg_ros.simulation.shade import shade
-from objreg_ros.simulation.write import simulate
+from objreg_ros.data.checked import Array
+from objreg_tools.simulation.params import ColourParams, DepthParams, RigParams, StressParams
+from objreg_tools.simulation.rendering.light import looking
+from objreg_tools.simulation.rendering.raster import Projection
+from objreg_tools.simulation.rendering.render import Rendering, render, see
+from objreg_tools.simulation.rendering.shade import shade
+from objreg_tools.simulation.scenarios import RecordingPlan, make_plan
+from objreg_tools.simulation.sensors.camera import CAMERAS, KINECT, LENSES, SENSORS, ColourSensor
+from objreg_tools.simulation.sensors.noise import DepthSensor
+from objreg_tools.simulation.sensors.rig import Motion, Rig
+from objreg_tools.simulation.world.mesh import Material, box
+from objreg_tools.simulation.world.scene import Scene
+from objreg_tools.simulation.write import simulate
 
 SHAPE = (KINECT.height, KINECT.width)
 BUILT = RigParams(distortion=LENSES["webcam"], lag_ms=30.0, rolling_ms=25.0, blur_ms=12.0, misregistration_px=4.0)
@@ -78,20 +78,20 @@ def one_frame(scene: Scene, T: Array, seed: int, stages: Stages) -> None:
     stages.take("truth", lambda: see(scene, instance, T, KINECT))
 
 
-def whole_frames(story: Story, views: Array, **options: Any) -> list[float]:
+def whole_frames(plan: RecordingPlan, views: Array, **options: Any) -> list[float]:
     """Wall milliseconds of every view."""
     out = []
     for k, T in enumerate(views):
         start = time.perf_counter()
-        render(story.scenes[0], T, seed=k, **options)
+        render(plan.scenes[0], T, seed=k, **options)
         out.append(1e3 * (time.perf_counter() - start))
     return out
 
 
-def processor_time(story: Story, views: Array) -> float:
+def processor_time(plan: RecordingPlan, views: Array) -> float:
     """Milliseconds of processor time a frame, of both threads together."""
     start = time.process_time()
-    whole_frames(story, views, threads=2)
+    whole_frames(plan, views, threads=2)
     return 1e3 * (time.process_time() - start) / len(views)
 
 
@@ -113,12 +113,12 @@ def wall_noise(metres: float) -> dict[str, float]:
     return {"measured_mm": 1e3 * float(depth[depth > 0].std()), "model_mm": 1e3 * float(model)}
 
 
-def draw_sensors(path: Path, story: Story) -> None:
+def draw_sensors(path: Path, plan: RecordingPlan) -> None:
     """A room through every sensor, colour beside depth (0.4 m red to 5 m blue, black for none)."""
-    scene, T = story.scenes[0], story.T_world_camera[SHOWN]
+    scene, T = plan.scenes[0], plan.T_world_camera[SHOWN]
     images = [render(scene, T, CAMERAS[camera], 1, depth) for camera, depth in SENSORS.values()]
-    motion = Motion(story.T_world_camera, story.rate)
-    images.append(Rig(BUILT, KINECT, 1).take(scene, motion, SHOWN / story.rate, 1))
+    motion = Motion(plan.T_world_camera, plan.rate)
+    images.append(Rig(BUILT, KINECT, 1).take(scene, motion, SHOWN / plan.rate, 1))
     cv2.imwrite(str(path), np.vstack([_beside(image) for image in images]))
 
 
@@ -142,13 +142,13 @@ def quantiles(ms: list[float]) -> dict[str, float]:
 def command(json_file: Path | None, quick: bool, picture: Path | None) -> None:
     """Time the simulator and print a table."""
     cv2.setNumThreads(1)
-    story = make_story("loop", 1, frames=60)
-    scene = story.scenes[0]
+    plan = make_plan("loop", 1, frames=60)
+    scene = plan.scenes[0]
     scene.prepare()
-    views = story.T_world_camera[:: 6 if quick else 2]
-    whole_frames(story, views[:1])  # compile
+    views = plan.T_world_camera[:: 6 if quick else 2]
+    whole_frames(plan, views[:1])  # compile
     if picture:
-        draw_sensors(picture, story)
+        draw_sensors(picture, plan)
     stages = Stages()
     for k, T in enumerate(views):
         one_frame(scene, T, k, stages)
@@ -156,9 +156,9 @@ def command(json_file: Path | None, quick: bool, picture: Path | None) -> None:
         "triangles": len(scene.surfaces.faces),
         "objects": len(scene.objects),
         "stages": {name: float(np.median(ms)) for name, ms in stages.ms.items()},
-        "frame_ms": {str(n): quantiles(whole_frames(story, views, threads=n)) for n in (1, 2)},
-        "processor_ms": processor_time(story, views),
-        "depth_only_ms": quantiles(whole_frames(story, views, with_colour=False)),
+        "frame_ms": {str(n): quantiles(whole_frames(plan, views, threads=n)) for n in (1, 2)},
+        "processor_ms": processor_time(plan, views),
+        "depth_only_ms": quantiles(whole_frames(plan, views, with_colour=False)),
         "recording_fps": recording_rate(60 if quick else 300),
         "noise": {str(metres): wall_noise(metres) for metres in DISTANCES_M},
     }

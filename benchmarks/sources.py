@@ -14,22 +14,26 @@ from peers import Shot
 from stills import stills
 
 from objreg_ros import share
-from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, LoopClosure, Rejected
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure, Rejected
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import ColourImage, DepthImage, Detections
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose, rotation_between
-from objreg_ros.offline import Stages, run_offline
-from objreg_ros.recording import Recording, open_recording
-from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.report.run.pictures import Album
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.sensor.organise import organise
-from objreg_ros.simulation.odometry import drifted, jittered
-from objreg_ros.simulation.params import OdometryParams
-from objreg_ros.simulation.truth import read_truth
-from objreg_ros.truth import Truth
+from objreg_tools.offline.line import run_offline
+from objreg_tools.offline.stages import Stages
+from objreg_tools.recording import Recording, open_recording
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.report.run.pictures import Album
+from objreg_tools.simulation.odometry import drifted, jittered
+from objreg_tools.simulation.params import OdometryParams
+from objreg_tools.simulation.truth import read_truth
+from objreg_tools.truth import Truth
 
 TRUE_BOXES, NO_BOXES = "truth", "nothing"  # in a model's stead
 SIMULATED = {"covariance_calibration": 0.01}  # such a camera is as its calibration says: see config/covariance.yaml

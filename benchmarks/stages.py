@@ -22,10 +22,11 @@ import click
 import numpy as np
 from sources import detector_of, read_source
 
-from objreg_ros.data import Array, Frame
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_ros.registration.params import RegistrarParams
 
 VARIANTS = ("with_odometry", "without_odometry")
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from objreg_ros.recording import Recording
-from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.record import Record
+from objreg_tools.recording import Recording
+from objreg_tools.recording.inputs import Inputs
+from objreg_tools.recording.record import Record
 
 CAMERA = ("image", "points", "depth", "camera_info", "colour_info")  # inputs that a moment is made of
 

@@ -34,7 +34,8 @@ from command_line import quick_values
 from frame_cost import frame_costs, table_frames
 from tqdm import tqdm
 
-from objreg_ros.data import Intrinsics, ObjectCloud, View
+from objreg_ros.data.frames import ObjectCloud, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.memory.checksum import sealed_keyframe, sealed_object
 from objreg_ros.memory.counters import Counters
 from objreg_ros.memory.descriptor import SIZE
@@ -43,8 +44,8 @@ from objreg_ros.memory.migration import insert
 from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject
-from objreg_ros.registration.params import RegistrarParams
 
 CAMERA = Intrinsics(fx=131.25, fy=131.25, cx=79.625, cy=59.625, width=160, height=120)
 LABELS = ("cup", "book", "chair", "tv", "keyboard", "bottle", "bowl", "mouse", "laptop")

@@ -28,15 +28,15 @@ from pairs import fused
 from sources import TRUE_BOXES, detector_of, read_source
 from tqdm import tqdm
 
-from objreg_ros.cli.simulate import camera_of, sensors_of
-from objreg_ros.data import Frame
+from objreg_ros.data.frames import Frame
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.simulation.write import simulate
+from objreg_tools.cli.commands.simulate import camera_of, sensors_of
+from objreg_tools.simulation.write import simulate
 
 PARAMS = RegistrarParams()
 BLOCK = 100  # pairs that a process is given at once
@@ -77,16 +77,16 @@ def _begin(places: list[list[Keyframe]]) -> None:
     _PLACES[:] = places
 
 
-def places_of(recordings: Sequence[Path], stories: Sequence[Told], frames: int, asked: Any) -> Iterator[list[Keyframe]]:
+def places_of(recordings: Sequence[Path], plans: Sequence[Told], frames: int, asked: Any) -> Iterator[list[Keyframe]]:
     """The keyframes of every recording, real ones by the detector and simulated ones by their true boxes."""
     for path in recordings:
         with read_source(path, asked, 1) as source:
             yield keyframes_of(source.frames)
-    for story in stories:
+    for plan in plans:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "recording"
-            sensors = sensors_of(camera_of(story.camera, None), story.stress, story.rig, story.sensor)
-            simulate(path, story.scenario, story.seed, frames, sensors=sensors, jpeg=True, threads=2)
+            sensors = sensors_of(camera_of(plan.camera, None), plan.stress, plan.rig, plan.sensor)
+            simulate(path, plan.scenario, plan.seed, frames, sensors=sensors, jpeg=True, threads=2)
             with read_source(path, detector_of(TRUE_BOXES), 1) as source:
                 yield keyframes_of(source.frames)
 
@@ -95,7 +95,7 @@ def places_of(recordings: Sequence[Path], stories: Sequence[Told], frames: int, 
 @click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path))
 @click.option(
     "--simulate",
-    "stories",
+    "plans",
     multiple=True,
     callback=lambda *given: [told(text) for text in given[2]],
     help="SCENARIO:SEED[...], as false_closures.py.",
@@ -109,7 +109,7 @@ def places_of(recordings: Sequence[Path], stories: Sequence[Told], frames: int, 
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path))
 def main(
     recordings: Sequence[Path],
-    stories: Sequence[Told],
+    plans: Sequence[Told],
     frames: int,
     count: int,
     model: str,
@@ -120,8 +120,8 @@ def main(
 ) -> None:
     """Force keyframes of different RECORDINGS upon each other, and count what is accepted."""
     cv2.setNumThreads(1)
-    places = list(places_of(recordings, stories, frames, detector_of(model, threshold)))
-    names = [path.name for path in recordings] + [story.name for story in stories]
+    places = list(places_of(recordings, plans, frames, detector_of(model, threshold)))
+    names = [path.name for path in recordings] + [plan.name for plan in plans]
     drawn = strangers(places, count, seed)
     blocks = [drawn[k : k + BLOCK] for k in range(0, len(drawn), BLOCK)]
     start = time.perf_counter()

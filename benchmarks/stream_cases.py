@@ -19,16 +19,17 @@ from stream_grounds import Ground, load
 from stream_recording import MemoryRecording
 
 from objreg_ros import share
-from objreg_ros.cli.recorded import Asked, Opened
-from objreg_ros.data import Array, ColourImage, Detections
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose_error
 from objreg_ros.plausibility.finding import Finding
-from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.recording.mounts import first_frames
-from objreg_ros.recording.troubles import troubles
-from objreg_ros.report.run.findings import find
+from objreg_tools.cli.recorded import Asked, Opened
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.recording.mounts import first_frames
+from objreg_tools.recording.troubles import troubles
+from objreg_tools.report.run.findings import find
 
 LEAST_SHARE = 0.8  # of the constraints of the right recording; fewer are a loss
 DRIFT_SEED = 1  # of all recordings but the right ones that are counted for themselves

@@ -30,10 +30,10 @@ from stream_recording import (
     restamped,
 )
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import Array
+from objreg_ros.bridge.messages import from_msg, headers, motion_from_msg
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, pose, rotation_from_quaternion, rotation_from_vector
-from objreg_ros.recording import messages
+from objreg_tools.recording.rosbag import messages
 
 Random = np.random.Generator
 FRONT_COLOUR, FRONT_INFO, FRONT = "/front/rgb/image_raw", "/front/rgb/camera_info", "front_optical"
@@ -215,7 +215,7 @@ def elsewhere(recording: MemoryRecording, frame_id: str) -> Stream:
 
 
 def _mirrored(make: Callable[[], Any], other: Callable[[], Any], frame_id: str) -> Any:
-    return mirrored(other(), from_msg.stamp_ns(make()), frame_id)
+    return mirrored(other(), headers.stamp_ns(make()), frame_id)
 
 
 def _front_camera(recording: MemoryRecording, rng: Random) -> Stream:
@@ -252,7 +252,7 @@ def late_pictures(recording: MemoryRecording, rng: Random, aside: Aside) -> Faul
 
 def odometry_poses(recording: MemoryRecording) -> Array:
     """``T_odom_body (N, 4, 4)``."""
-    return np.array([from_msg.odometry(message).T_odom_body for message in recording.messages(ODOM)])
+    return np.array([motion_from_msg.odometry(message).T_odom_body for message in recording.messages(ODOM)])
 
 
 def with_poses(recording: MemoryRecording, T_odom_body: Array) -> MemoryRecording:
@@ -263,7 +263,7 @@ def with_poses(recording: MemoryRecording, T_odom_body: Array) -> MemoryRecordin
 
 
 def _odometry(message: Any, T_odom_body: Array) -> Any:
-    ns, frame_id = from_msg.stamp_ns(message), message.header.frame_id
+    ns, frame_id = headers.stamp_ns(message), message.header.frame_id
     return messages.odometry(T_odom_body, UNKNOWN_POSE, ns, frame_id, message.child_frame_id)
 
 
@@ -332,7 +332,7 @@ def static_transform(T_parent_child: Array, stamp_ns: int, parent: str, child: s
 
 def _remounted(message: Any, T_body_camera: Array) -> Any:
     old = message.transforms[0]
-    ns = from_msg.stamp_ns(old)
+    ns = headers.stamp_ns(old)
     return static_transform(T_body_camera, ns, old.header.frame_id, old.child_frame_id)
 
 

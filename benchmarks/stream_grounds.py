@@ -38,15 +38,16 @@ from stream_recording import (
 )
 
 from objreg_ros import share
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import Array
+from objreg_ros.bridge.messages import from_msg, headers
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import interpolate, inverse, pose, rotation_from_vector
-from objreg_ros.recording import Recording, messages, open_recording
-from objreg_ros.recording.drift import DriftingOdometry
-from objreg_ros.recording.inputs import Inputs, choose_inputs
-from objreg_ros.simulation.scenarios import Story, make_story
-from objreg_ros.simulation.write import simulate, write_story
-from objreg_ros.truth import Truth
+from objreg_tools.recording import Recording, open_recording
+from objreg_tools.recording.drift import DriftingOdometry
+from objreg_tools.recording.inputs import Inputs, choose_inputs
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.simulation.scenarios import RecordingPlan, make_plan
+from objreg_tools.simulation.write import simulate, write_plan
+from objreg_tools.truth import Truth
 
 R_BODY_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # x forward, y left, z up
 ON_BODY_M = np.array([0.2, 0.03, 1.1])
@@ -128,13 +129,13 @@ def _pictures(recording: Recording, inputs: Inputs, truth: Truth, frames: int) -
     taken = set(np.linspace(0, count - 1, min(frames, count)).round().astype(int).tolist())
     colour, depth = (_messages(recording, topic, taken) for topic in (inputs.image, inputs.depth))
     info = in_frame(next(iter(recording.records([str(inputs.camera_info)]))).message, CAMERA)
-    at = [from_msg.stamp_ns(message) for message in depth]
+    at = [headers.stamp_ns(message) for message in depth]
     infos = [(ns, replace(info, header=messages.header(ns, CAMERA))) for ns in at]
     poses = zip(truth.stamps_ns, truth.poses, strict=True)
     streams = {
         COLOUR_INFO: Stream.of(INFO_TYPE, infos),
         DEPTH_INFO: Stream.of(INFO_TYPE, infos),
-        COLOUR: Stream.of(IMAGE_TYPE, [(from_msg.stamp_ns(m), _plain(m)) for m in colour]),
+        COLOUR: Stream.of(IMAGE_TYPE, [(headers.stamp_ns(m), _plain(m)) for m in colour]),
         DEPTH: Stream.of(IMAGE_TYPE, [(ns, in_frame(m, CAMERA)) for ns, m in zip(at, depth, strict=True)]),
         TRUTH: Stream.of(POSE_TYPE, [(ns, messages.pose_stamped(T, ns, "world")) for ns, T in poses]),
     }
@@ -147,14 +148,14 @@ def _messages(recording: Recording, topic: str | None, taken: set[int]) -> list[
 
 def _plain(message: Any) -> Any:
     """A colour picture as Image, whatever it came as."""
-    return messages.image(from_msg.image(message).rgb, "rgb8", from_msg.stamp_ns(message), CAMERA)
+    return messages.image(from_msg.image(message).rgb, "rgb8", headers.stamp_ns(message), CAMERA)
 
 
-def levelled(story: Story) -> Story:
+def levelled(plan: RecordingPlan) -> RecordingPlan:
     """The story as a robot drives it: at one height, with a camera that looks down by `TILT_DEG`."""
-    height = float(story.T_world_camera[:, 2, 3].mean())
-    poses = np.array([_driven(T, height) for T in story.T_world_camera])
-    return replace(story, T_world_camera=poses)
+    height = float(plan.T_world_camera[:, 2, 3].mean())
+    poses = np.array([_driven(T, height) for T in plan.T_world_camera])
+    return replace(plan, T_world_camera=poses)
 
 
 def _driven(T_world_camera: Array, height: float) -> Array:
@@ -171,8 +172,8 @@ def simulated(folder: Path, scenario: str, seed: int) -> Ground:
         part = path.with_name(f"{path.name}.part")
         shutil.rmtree(part, ignore_errors=True)
         if scenario == ROBOT:
-            story = levelled(make_story("loop", seed, SIMULATED_FRAMES))
-            write_story(part, story, ROBOT, seed, jpeg=True)
+            plan = levelled(make_plan("loop", seed, SIMULATED_FRAMES))
+            write_plan(part, plan, ROBOT, seed, jpeg=True)
         else:
             simulate(part, scenario, seed, SIMULATED_FRAMES, jpeg=True)
         os.replace(part, path)

@@ -12,8 +12,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from objreg_ros.recording import Record, Recording, messages
-from objreg_ros.recording.record import Topic
+from objreg_tools.recording import Record, Recording
+from objreg_tools.recording.record import Topic
+from objreg_tools.recording.rosbag import messages
 
 CAMERA, BODY = "camera_color_optical_frame", "base_link"
 COLOUR, COLOUR_INFO = "/camera/color/image_raw", "/camera/color/camera_info"

@@ -32,8 +32,8 @@ from stream_table import by_kind, mount_table, shared_table, table, totals
 from tqdm import tqdm
 
 from objreg_ros import share
-from objreg_ros.simulation.scenarios import SCENARIOS
-from objreg_ros.workers import spread
+from objreg_tools.simulation.scenarios import SCENARIOS
+from objreg_tools.workers import spread
 
 PARTS = ("faults", "mount")
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.simulation import furniture
-from objreg_ros.simulation.objects import make_object
-from objreg_ros.simulation.rooms import TABLE_CLASSES
-from objreg_ros.simulation.scenarios import Story
-from objreg_ros.simulation.scene import furnished, number, spread
-from objreg_ros.simulation.trajectory import Hand, around, carried
+from objreg_tools.simulation.scenarios import RecordingPlan
+from objreg_tools.simulation.trajectory import Hand, around, carried
+from objreg_tools.simulation.world import furniture
+from objreg_tools.simulation.world.objects import make_object
+from objreg_tools.simulation.world.rooms import TABLE_CLASSES
+from objreg_tools.simulation.world.scene import furnished, number, spread
 
 RATE_HZ = 30.0
 
 
-def table_story(objects: int, frames: int, seed: int) -> Story:
+def table_story(objects: int, frames: int, seed: int) -> RecordingPlan:
     """A camera that goes to and fro before the table."""
     rng = np.random.default_rng([seed, objects])
     table, room = furniture.table(rng, (1.6, 0.9)), furniture.room(rng, (3.0, 3.0))
@@ -25,4 +25,4 @@ def table_story(objects: int, frames: int, seed: int) -> Story:
     centre = np.array([0.0, 0.0, table.boards[0][2] + 0.05])
     way = [point for start, stop in ((-40, 40), (40, -40)) for point in around(centre, 1.3, 0.7, start, stop)]
     poses, rate = carried(way, frames, RATE_HZ, rng, Hand())
-    return Story((scene,), np.zeros(frames, int), poses, rate)
+    return RecordingPlan((scene,), np.zeros(frames, int), poses, rate)

@@ -41,10 +41,11 @@ from sources import SIMULATED
 from team_ends import GO, READY, SAVE, SAVED, SPENT, TOLD
 
 from objreg_ros.bridge.messages import to_msg
-from objreg_ros.cli.live import private_environment
-from objreg_ros.data import Frame, LoopClosure, Odometry, robot_of
+from objreg_ros.data.closures import LoopClosure, robot_of
+from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.memory.store import Store
-from objreg_ros.truth import FALSE, Truths, within
+from objreg_tools.cli.live import private_environment
+from objreg_tools.truth import FALSE, Truths, within
 
 ENDS = str(Path(__file__).with_name("team_ends.py"))
 START_S, SETTLE_S, LAST_S, END_S = 600.0, 120.0, 5.0, 20.0  # a first start compiles kernels

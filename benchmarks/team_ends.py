@@ -35,7 +35,7 @@ def drive(folder: Path, robot: str) -> None:
     """Publish the frames of a robot, as the script has laid them down, each at its moment."""
     import rclpy
 
-    from objreg_ros.bridge.node import profile
+    from objreg_ros.bridge.process import profile
 
     profile.apply()
     rclpy.init(args=[])
@@ -98,7 +98,8 @@ def receive(folder: Path) -> None:
     from nav_msgs.msg import Odometry
     from std_srvs.srv import Trigger
 
-    from objreg_ros.bridge.node import profile, qos
+    from objreg_ros.bridge.node import qos
+    from objreg_ros.bridge.process import profile
 
     profile.apply()
     rclpy.init(args=[])
@@ -131,7 +132,7 @@ def _note(told: dict[str, dict[str, str]], message: Any) -> None:
 
 def _hurried(message: Any) -> set[int]:
     from objreg_ros.bridge.node.diagnostics import refusal_of
-    from objreg_ros.data import Reason
+    from objreg_ros.data.closures import Reason
 
     refused = [refusal_of(status) for status in message.status]
     return {rejected.to_ns for rejected in refused if rejected.reason == Reason.OVER_BUDGET}

@@ -15,6 +15,7 @@ import mmap
 import multiprocessing
 import os
 import random
+import re
 import resource
 import signal
 import tempfile
@@ -33,7 +34,7 @@ WAITING_S = 30.0
 PREPARING_S = 600.0  # a first start compiles kernels
 GREED_MB = 500
 MEMORY = 4 << 30  # bytes of addresses beyond those that a process has when it begins
-PACKAGE = "objreg_ros/"
+PACKAGE = re.compile(r".*/(?=objreg_(?:ros|mapper|tools)/)")  # what comes before a file of ours
 KEPT_SEEDS = 5  # of findings that are alike
 MANY = 1 << 60
 KINDS = ("bug", "death", "hang", "greed", "wrong", "outside")
@@ -270,8 +271,8 @@ def _own_frames(error: BaseException) -> Iterator[str]:
     trace = error.__traceback__
     while trace is not None:
         code = trace.tb_frame.f_code
-        if PACKAGE in code.co_filename:
-            yield f"{code.co_filename.rpartition(PACKAGE)[2]}:{trace.tb_lineno} {code.co_name}"
+        if PACKAGE.match(code.co_filename):
+            yield f"{PACKAGE.sub('', code.co_filename)}:{trace.tb_lineno} {code.co_name}"
         trace = trace.tb_next
 
 
@@ -286,9 +287,9 @@ def _last_stack(log: Path) -> str:
     crashed = next((k for k, line in enumerate(lines) if line.startswith("Fatal Python error")), None)
     if crashed is None:
         return "; ".join(line.strip() for line in lines[-1:])[:200]
-    inside = (line for line in lines[crashed:] if PACKAGE in line)
+    inside = (line for line in lines[crashed:] if PACKAGE.match(line))
     found = next(inside, lines[crashed])
-    return found.rpartition(PACKAGE)[2].replace('", line ', ":").replace(" in ", " ")
+    return PACKAGE.sub("", found).replace('", line ', ":").replace(" in ", " ")
 
 
 def _limit_memory() -> None:

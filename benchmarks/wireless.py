@@ -32,7 +32,7 @@ import click
 import numpy as np
 from hosts import Hosts, conditions_of, lack
 
-from objreg_ros.bridge.node.profile import MODE, TRANSPORTS, VARIABLES, apply
+from objreg_ros.bridge.process.profile import MODE, TRANSPORTS, VARIABLES, apply
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 ENDS = str(Path(__file__).with_name("wireless_ends.py"))

@@ -36,6 +36,8 @@ COPY config config
 COPY launch launch
 COPY models models
 COPY objreg_ros objreg_ros
+COPY objreg_mapper objreg_mapper
+COPY objreg_tools objreg_tools
 RUN /opt/objreg/bin/pip install --no-cache-dir --no-deps --no-build-isolation .
 
 FROM system

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import click
 
-from objreg_ros.cli import NAME, SUMMARIES, group
+from objreg_tools.cli import NAME, SUMMARIES, group
 
 PAGE = Path(__file__).parent / "command-line.md"
 BEGIN, END = "<!-- made by docs/command_line.py -->", "<!-- end of what was made -->"

@@ -3,7 +3,7 @@
 
     python -m docs.draw_reasons [RUN.json …]
 
-The words are those of `objreg_ros/report/run/reasons.py`, the schemes those of `docs/schemes.py`. A RUN is what
+The words are those of `objreg_tools/report/run/reasons.py`, the schemes those of `docs/schemes.py`. A RUN is what
 `objreg offline REC --json RUN.json` wrote: of each reason that is met in it, the pair that is seen best becomes a
 picture. Without a RUN the pictures of pairs stay as they are.
 """
@@ -21,11 +21,12 @@ import numpy as np
 
 from docs.schemes import DROPS as DROP_SCHEMES
 from docs.schemes import SCHEMES
-from objreg_ros.data import UNTRIED, Array
-from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.recording.opening import open_recording
-from objreg_ros.report.run.pictures import Album, overlay
-from objreg_ros.report.run.reasons import DROPS, REFUSALS, ReasonText
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import UNTRIED
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.recording.opening import open_recording
+from objreg_tools.report.run.pictures import Album, overlay
+from objreg_tools.report.run.reasons import DROPS, REFUSALS, ReasonText
 
 FOLDER = Path(__file__).parent
 PICTURES = FOLDER / "pictures"
@@ -143,9 +144,9 @@ def section(name: str, words: ReasonText, picture: str, detail: str | None) -> s
     pair = f"![A pair refused as {name}](pictures/{name}.jpg)\n\n*{detail}*\n\n" if detail is not None else ""
     behind = [f"[`{parameter}`](parameters.md#{parameter.partition('.')[0]})" for parameter in words.parameters]
     behind += [f"`{limit}` in `{file}`" for file, limit in words.limits]
-    told = f" Behind it: {', '.join(behind)}." if behind else ""
+    lines = f" Behind it: {', '.join(behind)}." if behind else ""
     meaning = words.meaning[0].upper() + words.meaning[1:] if words.meaning[0] != "`" else words.meaning
-    return f"### `{name}`\n\n{meaning}. {words.remedy}{told}\n\n{picture}{pair}"
+    return f"### `{name}`\n\n{meaning}. {words.remedy}{lines}\n\n{picture}{pair}"
 
 
 if __name__ == "__main__":

@@ -86,8 +86,8 @@ def boxes(names: Iterable[str], y: float, colour: str) -> str:
 
 def falls(x: float, y: float, reasons: Sequence[str]) -> str:
     """The reasons by which a frame ends below a box."""
-    told = [words(x, y + 40 + 15 * k, reason, WRONG) for k, reason in enumerate(reasons)]
-    return arrow(x, y, x, y + 24, WRONG, dashed=True) + "".join(told)
+    lines = [words(x, y + 40 + 15 * k, reason, WRONG) for k, reason in enumerate(reasons)]
+    return arrow(x, y, x, y + 24, WRONG, dashed=True) + "".join(lines)
 
 
 TWO = camera(60, 75, 0, EARLIER) + camera(340, 75, 180, NEW)

@@ -7,10 +7,10 @@ In a node `edge` is the callback of a subscription to `nav_msgs/Odometry`, relia
 import numpy as np
 from nav_msgs.msg import Odometry
 
+from objreg_mapper.constraint import Constraint
+from objreg_mapper.formats.g2o import edge_text
 from objreg_ros.bridge.messages import from_msg, to_msg
-from objreg_ros.data import LoopClosure
-from objreg_ros.mapper.adapters.g2o import edge_text
-from objreg_ros.mapper.constraint import Constraint
+from objreg_ros.data.closures import LoopClosure
 
 
 def edge(message: Odometry) -> str:

@@ -8,8 +8,8 @@ Two conventions differ from ROS: GTSAM counts errors in the axes of *to*, and pu
 
 import numpy as np
 
-from objreg_ros.data import LoopClosure
-from objreg_ros.mapper.constraint import Constraint, local_information, rotation_first
+from objreg_mapper.constraint import Constraint, local_information, rotation_first
+from objreg_ros.data.closures import LoopClosure
 
 try:
     import gtsam

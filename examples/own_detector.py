@@ -4,14 +4,14 @@
 import numpy as np
 
 from objreg_ros import Camera, register
-from objreg_ros.simulation.render import render
-from objreg_ros.simulation.scenarios import make_story
+from objreg_tools.simulation.rendering.render import render
+from objreg_tools.simulation.scenarios import make_plan
 
 
 def main() -> None:
     """Register with boxes, and with masks."""
-    story = make_story("orbit", seed=7, frames=120)
-    shots = [render(story.scenes[0], story.T_world_camera[k], seed=k, threads=2) for k in (0, 8)]
+    plan = make_plan("orbit", seed=7, frames=120)
+    shots = [render(plan.scenes[0], plan.T_world_camera[k], seed=k, threads=2) for k in (0, 8)]
     camera = Camera(*(getattr(shots[0].intrinsics, name) for name in ("fx", "fy", "cx", "cy")))
 
     def boxes(rgb: np.ndarray) -> list[tuple[np.ndarray, str, float]]:

@@ -4,12 +4,12 @@
 from collections.abc import Sequence
 
 from objreg_ros import Camera, register
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.gate.verdict import Refusal, judge
 from objreg_ros.registration.propose.prior import Prior
-from objreg_ros.simulation.render import render
-from objreg_ros.simulation.scenarios import make_story
+from objreg_tools.simulation.rendering.render import render
+from objreg_tools.simulation.scenarios import make_plan
 
 
 def several(candidates: Sequence[Candidate], prior: Prior | None = None) -> Candidate | Refusal:
@@ -25,8 +25,8 @@ LEAST = 50
 
 def main() -> None:
     """The same pair through our gate and through a stricter one."""
-    story = make_story("orbit", seed=7, frames=120)
-    one, two = (render(story.scenes[0], story.T_world_camera[k], seed=k, threads=2) for k in (0, 8))
+    plan = make_plan("orbit", seed=7, frames=120)
+    one, two = (render(plan.scenes[0], plan.T_world_camera[k], seed=k, threads=2) for k in (0, 8))
     camera = Camera(*(getattr(one.intrinsics, name) for name in ("fx", "fy", "cx", "cy")))
     for gate in (judge, several):
         result = register(one.rgb, one.depth, two.rgb, two.depth, camera, gate=gate)

@@ -5,14 +5,14 @@ import numpy as np
 
 from objreg_ros import Camera, register
 from objreg_ros.geometry import inverse, pose_error
-from objreg_ros.simulation.render import Rendering, render
-from objreg_ros.simulation.scenarios import make_story
+from objreg_tools.simulation.rendering.render import Rendering, render
+from objreg_tools.simulation.scenarios import make_plan
 
 
 def main() -> None:
     """Register what is seen from one place and from a little beside it."""
-    story = make_story("orbit", seed=7, frames=120)
-    first, second = (picture(story, k) for k in (0, 8))
+    plan = make_plan("orbit", seed=7, frames=120)
+    first, second = (picture(plan, k) for k in (0, 8))
     seen = first.intrinsics
     camera = Camera(seen.fx, seen.fy, seen.cx, seen.cy)
     result = register(first.rgb, first.depth, second.rgb, second.depth, camera)
@@ -27,9 +27,9 @@ def main() -> None:
     print(f"off by {degrees:.2f} deg and {cm:.1f} cm")
 
 
-def picture(story, k: int) -> Rendering:
+def picture(plan, k: int) -> Rendering:
     """Frame ``k`` of the story, as the simulated camera sees it."""
-    return render(story.scenes[int(story.scene_of[k])], story.T_world_camera[k], seed=k, threads=2)
+    return render(plan.scenes[int(plan.scene_of[k])], plan.T_world_camera[k], seed=k, threads=2)
 
 
 if __name__ == "__main__":

@@ -2,21 +2,21 @@
 """A stream of frames with a memory: the registrar says when the camera is back where it was."""
 
 from objreg_ros import Camera, segment
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.simulation.render import render
-from objreg_ros.simulation.scenarios import make_story
+from objreg_tools.simulation.rendering.render import render
+from objreg_tools.simulation.scenarios import make_plan
 
 RATE = 2  # frames in a second of a slow camera
 
 
 def main() -> None:
     """Go there and back again without odometry, and print what the registrar closes and refuses."""
-    story = make_story("orbit", seed=7, frames=120)
+    plan = make_plan("orbit", seed=7, frames=120)
     registrar = Registrar(RegistrarParams(store=""))  # in memory; a file name remembers over restarts
     there = list(range(0, 25, 4))
     for n, k in enumerate(there + there[::-1]):
-        seen = render(story.scenes[int(story.scene_of[k])], story.T_world_camera[k], seed=n, threads=2)
+        seen = render(plan.scenes[int(plan.scene_of[k])], plan.T_world_camera[k], seed=n, threads=2)
         camera = Camera(seen.intrinsics.fx, seen.intrinsics.fy, seen.intrinsics.cx, seen.intrinsics.cy)
         frame = segment(seen.rgb, seen.depth, camera, stamp_ns=n * 1_000_000_000 // RATE)
         show(registrar.process(frame))

@@ -21,8 +21,9 @@ from launch_ros.actions import LifecycleNode, Node
 
 from launch import LaunchContext, LaunchDescription
 from objreg_ros import share
-from objreg_ros.bridge.node import profile
+from objreg_ros.bridge.process import profile
 
+MODULES = {"keyframer": "objreg_ros.keyframes.node", "mapper": "objreg_mapper.node"}  # others are named as their stage
 NODES = ("detector", "segmenter", "registrar")
 
 TOPICS = {
@@ -129,7 +130,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
 
 
 def _alone(node: str, said: dict[str, str], alike: dict) -> Node:
-    arguments = ["-m", f"objreg_ros.{'keyframes' if node == 'keyframer' else node}.node"]
+    arguments = ["-m", MODULES.get(node, f"objreg_ros.{node}.node")]
     kind = LifecycleNode if _is_true(said["managed"]) else Node  # which events of a launch file around this one reach
     return kind(
         executable=sys.executable,
@@ -144,7 +145,7 @@ def _alone(node: str, said: dict[str, str], alike: dict) -> Node:
 
 def _together(names: tuple[str, ...], said: dict[str, str], alike: dict) -> Node:
     """One process; launch names no node of it, and so a file says whose each parameter is."""
-    arguments = ["-m", "objreg_ros.graph", *names]
+    arguments = ["-m", "objreg_tools.graph", *names]
     return Node(
         executable=sys.executable,
         arguments=arguments,

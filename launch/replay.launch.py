@@ -60,7 +60,7 @@ def _player(context: LaunchContext) -> list:
 
 def _command(said: dict[str, str]) -> list[str]:
     """The player as a command line."""
-    command = [sys.executable, "-m", "objreg_ros.cli", "replay", said["recording"]]
+    command = [sys.executable, "-m", "objreg_tools.cli", "replay", said["recording"]]
     command += ["--rate", said["rate"]] if said["rate"] else []
     command += ["--source", said["source"]] if said["source"] else []
     command += ["--lossless"] if _is_true(said["lossless"]) else []

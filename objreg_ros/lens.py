@@ -15,7 +15,8 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, Detections, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 
 # model: how many coefficients it may have
 MODELS = {

@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from objreg_ros import share
-from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, Intrinsics, PointCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics, PointCloud
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import inverse
@@ -26,7 +28,7 @@ from objreg_ros.lens import Lens
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import RegistrationParams
 from objreg_ros.registration.result import Registration
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
@@ -88,7 +90,7 @@ def register(
     detector: Detects | None = None,
     gate: Gate | None = None,
     method: Method | str | None = None,
-    params: RegistrarParams | None = None,
+    params: RegistrationParams | None = None,
 ) -> Registration:
     """Lay two RGB-D pictures of one camera upon each other by the objects and all else that they show.
 
@@ -120,7 +122,7 @@ def register_clouds(
     detector: Detects | None = None,
     gate: Gate | None = None,
     method: Method | str | None = None,
-    params: RegistrarParams | None = None,
+    params: RegistrationParams | None = None,
 ) -> Registration:
     """As `register`, of two clouds, each in the optical frame of the camera that saw it.
 
@@ -143,7 +145,7 @@ def register_keyframes(
     *,
     gate: Gate | None = None,
     method: Method | str | None = None,
-    params: RegistrarParams | None = None,
+    params: RegistrationParams | None = None,
 ) -> Registration:
     """As `register`, of two short lists of frames (`segment`), each seen within a short time and fused into a keyframe.
 
@@ -151,7 +153,7 @@ def register_keyframes(
     about the motion between the two. ``T_1_2`` maps points of the camera of the first frame of ``frames_2`` into
     that of the first frame of ``frames_1``. ValueError for an empty list, and for frames without odometry.
     """
-    params = params or RegistrarParams()
+    params = params or RegistrationParams()
     if isinstance(method, str):
         params, method = params.replaced(method=method), None
     target, T_1_target = _fused(frames_1, "frames_1", params)
@@ -297,7 +299,7 @@ def _organised(xyz: Array, rgb: Array | None, camera: Camera | None) -> DepthIma
     return organise(PointCloud(xyz=points, rgb=rgb, stamp_ns=0), intrinsics)
 
 
-def _fused(frames: Sequence[Frame], name: str, params: RegistrarParams) -> tuple[Keyframe, Array]:
+def _fused(frames: Sequence[Frame], name: str, params: RegistrationParams) -> tuple[Keyframe, Array]:
     """The keyframe of the frames, and ``T_first_keyframe (4, 4)``: its camera in that of the first of them."""
     if len(frames) == 0:
         raise ValueError(f"{name}: expected at least one frame, got none")

@@ -165,6 +165,18 @@ class MountedParams(Params):
         return mounting(self.T_base_camera)
 
 
+@dataclasses.dataclass(frozen=True)
+class FramesParams(MountedParams):
+    """How frames are brought together with odometry."""
+
+    odom_slop: float = param(
+        0.02,
+        "largest distance in time between a frame and its odometry, unless two within seven times it enclose the frame",
+        "s",
+        ge=0.0,
+    )
+
+
 def require_namespaces(name: str, values: Sequence[str]) -> None:
     """ValueError for a parameter ``name`` unless its values are distinct names of ROS namespaces."""
     if len({value.strip("/") for value in values}) < len(values) or not all(map(NAMESPACE.fullmatch, values)):

@@ -7,23 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from objreg_ros.data import (
-    Array,
-    ColourImage,
-    DepthImage,
-    Detections,
-    Frame,
-    LoopClosure,
-    ObjectCloud,
-    PointCloud,
-    Reason,
-    Rejected,
-    View,
-)
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.frames import Frame, ObjectCloud, View
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, PointCloud
 from objreg_ros.geometry import back_project, inverse
-from objreg_ros.offline import Stages
 from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
 from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
+from objreg_tools.offline.stages import Stages
 
 
 @dataclass

@@ -7,34 +7,36 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros import data, limits
-from objreg_ros.data import PointFlag, framed, robot_of
+from objreg_ros import limits
+from objreg_ros.data import closures, frames, images
+from objreg_ros.data.closures import framed, robot_of
+from objreg_ros.data.frames import PointFlag
 
 NAN = np.float32(np.nan)
-CAMERA = data.Intrinsics(fx=50.0, fy=60.0, cx=31.5, cy=23.5, width=64, height=48)
+CAMERA = images.Intrinsics(fx=50.0, fy=60.0, cx=31.5, cy=23.5, width=64, height=48)
 
 
 def floats(*shape: int) -> np.ndarray:
     return np.zeros(shape, np.float32)
 
 
-def cloud(**changes: Any) -> data.ObjectCloud:
+def cloud(**changes: Any) -> frames.ObjectCloud:
     values = {"label": "cup", "score": 0.5, "instance": 1, "xyz": floats(4, 3), "normals": floats(4, 3), "rgb": None,
               "flags": np.zeros(4, np.uint16), "density": 1.0, **changes}  # fmt: skip
-    return data.ObjectCloud(**values)
+    return frames.ObjectCloud(**values)
 
 
-def view(**changes: Any) -> data.View:
-    return data.View(**{"xyz": 1.0 + floats(48, 64, 3), "grey": None, "intrinsics": CAMERA, **changes})
+def view(**changes: Any) -> frames.View:
+    return frames.View(**{"xyz": 1.0 + floats(48, 64, 3), "grey": None, "intrinsics": CAMERA, **changes})
 
 
-def frame(**changes: Any) -> data.Frame:
+def frame(**changes: Any) -> frames.Frame:
     values = {"objects": (cloud(),), "support": None, "view": view(), "gravity": None, "gravity_confidence": 0.0,
               "T_odom_camera": None, "stamp_ns": 5, **changes}  # fmt: skip
-    return data.Frame(**values)
+    return frames.Frame(**values)
 
 
-def detections(**changes: Any) -> data.Detections:
+def detections(**changes: Any) -> images.Detections:
     values = {
         "xyxy": floats(2, 4),
         "score": floats(2),
@@ -43,26 +45,26 @@ def detections(**changes: Any) -> data.Detections:
         "stamp_ns": 5,
         **changes,
     }
-    return data.Detections(**values)
+    return images.Detections(**values)
 
 
-def closure(**changes: Any) -> data.LoopClosure:
+def closure(**changes: Any) -> closures.LoopClosure:
     values = {"from_ns": 1, "to_ns": 2, "T_from_to": np.eye(4), "covariance": np.eye(6), "labels": (), **changes}
-    return data.LoopClosure(**values)
+    return closures.LoopClosure(**values)
 
 
-def alignment(**changes: Any) -> data.Alignment:
+def alignment(**changes: Any) -> closures.Alignment:
     values = {"T_target_source": np.eye(4), "information": np.eye(6), "inliers": 3, "overlap": 0.5, "rmse": 0.1,
               "converged": True, **changes}  # fmt: skip
-    return data.Alignment(**values)
+    return closures.Alignment(**values)
 
 
-def depth_image(**changes: Any) -> data.DepthImage:
-    return data.DepthImage(**{"depth": floats(48, 64), "rgb": None, "intrinsics": CAMERA, "stamp_ns": 5, **changes})
+def depth_image(**changes: Any) -> images.DepthImage:
+    return images.DepthImage(**{"depth": floats(48, 64), "rgb": None, "intrinsics": CAMERA, "stamp_ns": 5, **changes})
 
 
-def point_cloud(**changes: Any) -> data.PointCloud:
-    return data.PointCloud(**{"xyz": floats(1, 7, 3), "rgb": None, "stamp_ns": 5, **changes})
+def point_cloud(**changes: Any) -> images.PointCloud:
+    return images.PointCloud(**{"xyz": floats(1, 7, 3), "rgb": None, "stamp_ns": 5, **changes})
 
 
 WORDS = (cloud, view, frame, detections, closure, alignment, depth_image, point_cloud)
@@ -180,7 +182,7 @@ def test_a_reduced_camera_sees_the_rays_of_the_pixels_that_it_keeps(step: int) -
 @pytest.mark.parametrize("T", [R_MIRRORED, R_SCALED, np.full((4, 4), np.nan), np.eye(3)])
 def test_an_odometry_that_is_no_rigid_motion_is_refused(T: np.ndarray) -> None:
     with pytest.raises(ValueError, match=r"Odometry\.T_odom_body: expected"):
-        data.Odometry(T_odom_body=T, stamp_ns=5)
+        frames.Odometry(T_odom_body=T, stamp_ns=5)
 
 
 def test_each_flag_of_a_point_is_the_bit_that_stores_and_messages_have_for_it() -> None:
@@ -224,13 +226,13 @@ def test_a_view_may_have_points_that_were_not_measured() -> None:
 
 def test_a_camera_of_more_pixels_than_any_picture_is_refused() -> None:
     with pytest.raises(ValueError, match=r"expected at most 500000000 pixels, got \(1000000, 1000000\)"):
-        data.Intrinsics(fx=500.0, fy=500.0, cx=0.0, cy=0.0, width=10**6, height=10**6)
+        images.Intrinsics(fx=500.0, fy=500.0, cx=0.0, cy=0.0, width=10**6, height=10**6)
 
 
 def test_a_view_that_no_registrar_would_take_is_refused_where_it_is_made() -> None:
-    camera = data.Intrinsics(fx=50.0, fy=50.0, cx=40.0, cy=30000.0, width=80, height=60000)
+    camera = images.Intrinsics(fx=50.0, fy=50.0, cx=40.0, cy=30000.0, width=80, height=60000)
     with pytest.raises(ValueError, match=r"View: expected at most 600000 pixels, got \(80, 60000\)"):
-        data.View(xyz=np.zeros((60000, 80, 3), np.float32), grey=None, intrinsics=camera)
+        frames.View(xyz=np.zeros((60000, 80, 3), np.float32), grey=None, intrinsics=camera)
 
 
 @pytest.mark.parametrize("nearest", [0.0, 1e-9, 9e-4, -1.0])
@@ -246,10 +248,10 @@ def test_a_view_has_nothing_nearer_than_a_millimetre(nearest: float) -> None:
 
 def test_a_place_in_an_earlier_map_has_rigid_poses_and_a_finite_covariance() -> None:
     good = {"T_map_odom": np.eye(4), "T_map_camera": np.eye(4), "covariance": np.eye(6)}
-    assert data.Relocalised(stamp_ns=1, session=0, target_ns=0, closures=2, **good).covariance.shape == (6, 6)
+    assert closures.Relocalised(stamp_ns=1, session=0, target_ns=0, closures=2, **good).covariance.shape == (6, 6)
     for name, bad in (("T_map_odom", 2 * np.eye(4)), ("covariance", np.full((6, 6), np.nan))):
         with pytest.raises(ValueError, match="Relocalised"):
-            data.Relocalised(stamp_ns=1, session=0, target_ns=0, closures=2, **good | {name: bad})
+            closures.Relocalised(stamp_ns=1, session=0, target_ns=0, closures=2, **good | {name: bad})
 
 
 def test_a_picture_of_instances_is_shown_in_another_size_by_the_nearest_pixel() -> None:
@@ -272,8 +274,8 @@ def test_a_box_touches_the_pixels_that_it_covers_in_part_and_none_outside_the_pi
 def test_robots_may_be_the_same_as_far_as_both_are_told() -> None:
     one = closure(from_robot="a", to_robot="b")
     assert one.robots == ("a", "b") and closure().robots == ("", "")
-    assert data.may_be_same(one.robots, ("", "")) and data.may_be_same(one.robots, ("a", ""))
-    assert not data.may_be_same(one.robots, ("a", "a")) and one.moments == closure().moments
+    assert closures.may_be_same(one.robots, ("", "")) and closures.may_be_same(one.robots, ("a", ""))
+    assert not closures.may_be_same(one.robots, ("a", "a")) and one.moments == closure().moments
 
 
 def test_a_frame_gets_the_prefix_of_its_robot_once() -> None:

@@ -16,7 +16,7 @@ import pytest
 from golden import files, record, runs
 from golden.comparison import differences
 
-from objreg_ros.data import ColourImage
+from objreg_ros.data.images import ColourImage
 from objreg_ros.geometry import pose, rotation_from_vector
 
 LEAST = 5  # constraints, and refusals for which something was registered, without which a recording shows little

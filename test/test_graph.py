@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.graph import STAGES, chosen
+from objreg_tools.graph import STAGES, chosen
 
 
 def test_without_names_it_is_the_three_rooms() -> None:

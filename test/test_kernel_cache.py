@@ -83,7 +83,7 @@ def test_shared_memory_is_taken_where_no_temporary_folder_can_be_written(
 
 
 PROGRAM = """
-from objreg_ros.cli.checks import compiled_code
+from objreg_tools.cli.checks import compiled_code
 from objreg_ros.segmenter.sensor import view
 
 assert view._back_project.stats.cache_path.startswith({passing!r}) and not compiled_code().stops

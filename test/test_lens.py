@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.data import DepthImage, Detections, Intrinsics
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.lens import Lens
 
 CAMERA = Intrinsics(fx=260.0, fy=250.0, cx=161.0, cy=118.0, width=320, height=240)

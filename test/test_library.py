@@ -17,9 +17,11 @@ from registration import rooms
 
 import objreg_ros
 from objreg_ros import Camera, Registration, register, register_clouds, register_keyframes, segment
-from objreg_ros.data import Detections, Frame, Reason
+from objreg_ros.data.closures import Reason
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import Detections
 from objreg_ros.geometry import back_project, inverse, pose_error, transform
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 
 CAMERA = Camera(rooms.CAMERA.fx, rooms.CAMERA.fy, rooms.CAMERA.cx, rooms.CAMERA.cy)
 SIZED = replace(CAMERA, width=rooms.CAMERA.width, height=rooms.CAMERA.height)

@@ -15,7 +15,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-CHECKED = ("objreg_ros", "launch", "setup.py")
+PACKAGES = ("objreg_ros", "objreg_mapper", "objreg_tools")
+CHECKED = (*PACKAGES, "launch", "setup.py")
 SPDX = "# SPDX-License-Identifier: Apache-2.0"
 FLAKE8 = """[flake8]
 max-line-length = 120
@@ -87,7 +88,7 @@ def test_ament_misses_a_copyright_notice_and_nothing_else(
 
 
 def test_every_source_names_its_licence_by_spdx(repository: Path) -> None:
-    paths = [path for folder in ("objreg_ros", "launch", "examples") for path in (repository / folder).rglob("*.py")]
+    paths = [path for folder in (*PACKAGES, "launch", "examples") for path in (repository / folder).rglob("*.py")]
     without = [path.name for path in paths if SPDX not in path.read_text(encoding="utf-8").splitlines()[:2]]
     assert len(paths) > 100 and without == []
 

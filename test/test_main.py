@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-OBJREG = [sys.executable, "-m", "objreg_ros"]
+OBJREG = [sys.executable, "-m", "objreg_tools"]
 SIGNALLED = (128 + signal.SIGINT, -signal.SIGINT)  # told by the command, or by the system before it
 IN_IMPORT = """
 import signal, sys
@@ -24,7 +24,7 @@ class Interrupting:
 
 module = sys.argv.pop(1)
 sys.meta_path.insert(0, Interrupting())
-from objreg_ros.__main__ import main
+from objreg_tools.__main__ import main
 main()
 """
 BEGUN = """
@@ -32,13 +32,13 @@ import signal, sys
 
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 print("begun", flush=True)
-from objreg_ros.__main__ import main
+from objreg_tools.__main__ import main
 main()
 """
 SWALLOWED = """
 import signal, time, weakref
-from objreg_ros import cli
-from objreg_ros.__main__ import main
+from objreg_tools import cli
+from objreg_tools.__main__ import main
 
 class Thing:
     pass
@@ -55,8 +55,8 @@ main()
 
 MISTAKEN = """
 import signal
-from objreg_ros import cli
-from objreg_ros.__main__ import main
+from objreg_tools import cli
+from objreg_tools.__main__ import main
 
 def work(**_):
     try:
@@ -75,7 +75,7 @@ def ended(words: list[str]) -> tuple[int, str]:
     return told.returncode, told.stderr
 
 
-@pytest.mark.parametrize("module", ["click", "objreg_ros.cli.inspect", "numpy", "cv2", "rosbags.interfaces"])
+@pytest.mark.parametrize("module", ["click", "objreg_tools.cli.commands.inspect", "numpy", "cv2", "rosbags.interfaces"])
 def test_an_interrupt_during_an_import_says_nothing(module: str, tmp_path: Path) -> None:
     status, said = ended([sys.executable, "-c", IN_IMPORT, module, "inspect", str(tmp_path)])
     assert status in SIGNALLED and not said.strip()

@@ -11,25 +11,27 @@ from typing import Any
 import numpy as np
 import pytest
 from bridge.trees import said, transform
-from recording.folders import CAMERA, records, uncalibrated
+from recording.sample_folders import CAMERA, records, uncalibrated
 from recording.vision import detected
 from simple_rooms import OneBox, simple_rooms
 
 from objreg_ros.bridge.camera.frames import FrameTree
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import ColourImage, DepthImage, Detections, Frame, Intrinsics
+from objreg_ros.bridge.messages import headers, motion_from_msg
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import back_project, pose, rotation_angle, rotation_from_vector
-from objreg_ros.offline import Timing, as_sent, run_offline
-from objreg_ros.recording import Record, messages
-from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.mounts import TRANSFORMS
-from objreg_ros.recording.recorded_detections import RecordedDetections
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.organise import organise
 from objreg_ros.segmenter.sensor.sensor_estimate import Lag, SensorEstimate
-from objreg_ros.truth import Truth
+from objreg_tools.offline.line import Timing, as_sent, run_offline
+from objreg_tools.recording import Record
+from objreg_tools.recording.inputs import Inputs
+from objreg_tools.recording.mounts import TRANSFORMS
+from objreg_tools.recording.recorded_detections import RecordedDetections
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.truth import Truth
 
 INPUTS = Inputs(image="/image", depth="/depth/image", camera_info="/camera_info", odom="/odom")
 MS = 1_000_000
@@ -170,7 +172,7 @@ def test_a_frame_between_two_odometry_messages_has_a_pose_between_theirs() -> No
         if record.topic == "/odom":
             early = wanted[record.stamp_ns] * MS
             message = messages.odometry(
-                from_msg.odometry(record.message).T_odom_body, np.eye(6), early, "odom", "camera"
+                motion_from_msg.odometry(record.message).T_odom_body, np.eye(6), early, "odom", "camera"
             )
             record = Record.of("/odom", message, early)
         shifted.append(record)
@@ -522,7 +524,7 @@ def with_joint(recorded: list[Record], reaches: int) -> Iterator[Record]:
     for record in recorded:
         yield other_body(record)
         if record.topic == "/odom" and count < reaches:
-            stamp_ns = from_msg.stamp_ns(record.message)
+            stamp_ns = headers.stamp_ns(record.message)
             message = said(transform("base", "camera", turned_about_x(0.1 * count), stamp_ns))
             yield Record("/tf", TRANSFORMS, record.stamp_ns, lambda message=message: message, bytes)
             count += 1

@@ -16,8 +16,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import pytest
-
 RELEASED_IN_JAZZY = {
     "ament_index_python", "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "launch", "launch_ros", "nav_msgs",
     "rcl_interfaces", "rclpy", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs", "tf2_msgs", "tf2_ros_py",
@@ -41,6 +39,7 @@ IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, 
     "python3-tqdm": "python3-tqdm 4.66.2",
     "python3-yaml": "python3-yaml 6.0.1",
 }
+ON_A_ROBOT = ("tools", "paper")  # the extras that package.xml brings
 BY_REQUIREMENTS = {"numba"}  # requirements/robot.txt: noble has no python3-numba, and rosdep no key of pip's for it
 OTHER_NAMES = {"opencv-python-headless": "opencv", "pillow": "pil", "pyyaml": "yaml"}
 
@@ -82,24 +81,25 @@ def test_messages_need_only_what_jazzy_has_released(repository: Path) -> None:
 
 def test_whatever_setup_py_asks_for_comes_with_a_robot_too(repository: Path) -> None:
     by_requirements = (repository / "requirements/robot.txt").read_text()
-    for name in required(repository):
+    for name in required(repository, *ON_A_ROBOT):
         key = f"python3-{OTHER_NAMES.get(name, name)}"
         assert key in IN_NOBLE or f"{key}-pip" in IN_NOBLE or f"\n{name}>=" in by_requirements, name
 
 
-@pytest.mark.parametrize("key", [key for key, package in IN_NOBLE.items() if not package.startswith("pip: ")])
-def test_nobles_version_is_one_that_setup_py_takes(repository: Path, key: str) -> None:
-    oldest = {
-        f"python3-{OTHER_NAMES.get(name, name)}": text for name, text in required(repository, "simulation").items()
-    }
-    assert version(IN_NOBLE[key].split()[1]) >= version(oldest.get(key, "0"))
+def test_nobles_version_is_one_that_setup_py_takes(repository: Path) -> None:
+    for key in [key for key, package in IN_NOBLE.items() if not package.startswith("pip: ")]:
+        oldest = {
+            f"python3-{OTHER_NAMES.get(name, name)}": text
+            for name, text in required(repository, *ON_A_ROBOT, "report").items()
+        }
+        assert version(IN_NOBLE[key].split()[1]) >= version(oldest.get(key, "0")), key
 
 
-def test_a_robot_is_asked_for_nothing_that_only_a_simulation_needs(repository: Path) -> None:
+def test_a_robot_is_asked_for_nothing_that_only_drawings_need(repository: Path) -> None:
     root = ElementTree.parse(repository / "package.xml").getroot()
     on_robot = {element.text for element in root.iter("exec_depend")}
-    only = set(required(repository, "simulation")) - set(required(repository))
-    assert only == {"matplotlib"} and not {f"python3-{name}" for name in only} & on_robot
+    only = set(required(repository, "report")) - set(required(repository))
+    assert only == {"matplotlib", "plotly"} and not {f"python3-{name}" for name in only} & on_robot
 
 
 def test_what_requirements_bring_is_what_setup_py_asks_for(repository: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.params import Params, param
-from objreg_ros.registration.params import RegistrarNodeParams
+from objreg_ros.registrar.params import RegistrarNodeParams
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from recording.folders import CAMERA, records
+from recording.sample_folders import CAMERA, records
 
-from objreg_ros.data import Intrinsics
-from objreg_ros.recording import Recording, messages, open_recording, write_rosbag2
-from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.recording.record import Record
-from objreg_ros.rehearsal import rehearse
-from objreg_ros.report.run.findings import found_in
+from objreg_ros.data.images import Intrinsics
+from objreg_tools.recording import Recording, open_recording, write_rosbag2
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.recording.record import Record
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.rehearsal import rehearse
+from objreg_tools.report.run.findings import found_in
 
 PERIOD_NS = 33_000_000
 

@@ -8,7 +8,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import pytest
 import yaml
 
 FORMS = ("bug", "closure", "idea")
@@ -26,19 +25,16 @@ def loaded(path: Path) -> Any:
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize(
-    ("file", "line"),
-    [
+def test_a_file_has_the_version_that_the_changelog_released(repository: Path) -> None:
+    for file, line in [
         ("setup.py", 'version="{}",'),
         ("package.xml", "<version>{}</version>"),
         ("objreg_msgs/package.xml", "<version>{}</version>"),
         ("CITATION.cff", "version: {}\n"),
         ("docs/releases/{}.md", "# {}\n"),
-    ],
-)
-def test_a_file_has_the_version_that_the_changelog_released(repository: Path, file: str, line: str) -> None:
-    version, _ = released(repository)
-    assert line.format(version) in (repository / file.format(version)).read_text()
+    ]:
+        version, _ = released(repository)
+        assert line.format(version) in (repository / file.format(version)).read_text(), file
 
 
 def test_the_changelog_has_a_place_for_what_is_not_released(repository: Path) -> None:
@@ -56,15 +52,15 @@ def test_both_packages_have_the_same_licence_file(repository: Path) -> None:
     assert (repository / "LICENSE").read_bytes() == (repository / "objreg_msgs/LICENSE").read_bytes()
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_a_form_for_issues_asks_what_a_host_can_show(repository: Path, form: str) -> None:
-    told = loaded(repository / f".github/ISSUE_TEMPLATE/{form}.yml")
-    assert told["name"] and told["description"]
-    asked = [field for field in told["body"] if field["type"] != "markdown"]
-    assert {field["type"] for field in told["body"]} <= FIELDS and asked
-    assert len({field["id"] for field in asked}) == len(asked)
-    assert all(field["attributes"]["label"] for field in asked)
-    assert any(field.get("validations", {}).get("required") for field in asked)
+def test_a_form_for_issues_asks_what_a_host_can_show(repository: Path) -> None:
+    for form in FORMS:
+        told = loaded(repository / f".github/ISSUE_TEMPLATE/{form}.yml")
+        assert told["name"] and told["description"], form
+        asked = [field for field in told["body"] if field["type"] != "markdown"]
+        assert {field["type"] for field in told["body"]} <= FIELDS and asked, form
+        assert len({field["id"] for field in asked}) == len(asked), form
+        assert all(field["attributes"]["label"] for field in asked), form
+        assert any(field.get("validations", {}).get("required") for field in asked), form
 
 
 def test_the_devcontainer_is_a_stage_of_the_image_for_python(repository: Path) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.sensor import (
     DEPTH_NOISE_GROWTH,
     DEPTH_NOISE_M,

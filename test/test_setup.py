@@ -18,14 +18,15 @@ from zipfile import ZipFile
 import numpy
 import pytest
 
+PACKAGES = ("objreg_ros", "objreg_mapper", "objreg_tools")
 SOURCES = ("setup.py", "setup.cfg", "README.md", "LICENSE", "package.xml")
-FOLDERS = ("resource", "config", "launch", "models", "objreg_ros")
+FOLDERS = ("resource", "config", "launch", "models", *PACKAGES)
 LEFT_OUT = ("__pycache__", "*.nbi", "*.nbc")
 RUN = """
 from pathlib import Path
-import objreg_ros.data
+import objreg_ros
 from objreg_ros import register, share
-print(Path(objreg_ros.data.__file__).parent)
+print(Path(objreg_ros.__file__).parent)
 print(share.find("models/objreg_ssd.onnx"), share.find("config/objreg.yaml"))
 """
 
@@ -84,7 +85,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_its_share(repository: 
         held = set(archive.namelist())
     (data,) = {name.partition("/")[0] for name in held if ".data/" in name}
     share = f"{data}/data/share/objreg_ros"
-    wanted = {str(path) for path in files(repository, "objreg_ros")} | {"objreg_ros/py.typed"}
+    wanted = {str(path) for path in files(repository, *PACKAGES)} | {f"{package}/py.typed" for package in PACKAGES}
     wanted |= {f"{share}/{path}" for path in files(repository, "config", "launch", "models")}
     wanted |= {f"{share}/package.xml", f"{share}/LICENSE"}
     assert wanted <= held, f"the wheel lacks {sorted(wanted - held)}"

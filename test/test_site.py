@@ -54,9 +54,10 @@ def test_the_docstrings_are_pages(site: Path) -> None:
     library = (site / "api/library.html").read_text(encoding="utf-8")
     assert "objreg_ros.library.register_clouds" in library and "Lay two RGB-D pictures of one camera" in library
     data = (site / "api/data.html").read_text(encoding="utf-8")
-    assert all(f'id="objreg_ros.data.{name}"' in data for name in ("LoopClosure", "Rejected", "Reason", "Frame"))
+    names = ("closures.LoopClosure", "closures.Rejected", "closures.Reason", "frames.Frame", "images.Intrinsics")
+    assert all(f'id="objreg_ros.data.{name}"' in data for name in names)
     assert "T_target_source" in (site / "api/registrar.html").read_text(encoding="utf-8")
-    assert 'id="objreg_ros.mapper.pose_graph.PoseGraph"' in (site / "api/pose-graph.html").read_text(encoding="utf-8")
+    assert 'id="objreg_mapper.pose_graph.PoseGraph"' in (site / "api/pose-graph.html").read_text(encoding="utf-8")
 
 
 def test_a_link_that_leads_nowhere_ends_the_build(repository: Path, tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def in_terminal(command: list[str]) -> str:
     return said.decode()
 
 
-@pytest.mark.parametrize("module", ["objreg_ros", "objreg_ros.cli"])
+@pytest.mark.parametrize("module", ["objreg_tools", "objreg_tools.cli"])
 @pytest.mark.parametrize("words", [["inspect"], ["offline"], ["-v", "offline"], ["convert"]], ids=" ".join)
 def test_the_command_shows_names_of_a_recording_without_obeying_them(
     module: str, words: list[str], tmp_path: Path

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording.folders import lost
+from recording.sample_folders import lost
 
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.recording import messages, open_recording, write_rosbag2
-from objreg_ros.recording.record import Record
-from objreg_ros.truth import MAX_GAP_NS, Truth, Truths, spread, summarise
+from objreg_tools.recording import open_recording, write_rosbag2
+from objreg_tools.recording.record import Record
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.truth import MAX_GAP_NS, Truth, Truths, spread, summarise
 
 MS = 1_000_000
 

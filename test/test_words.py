@@ -6,18 +6,19 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
-
 # The word, and where it has its common meaning: doors, rooms and books of simulated buildings, opencv's own names.
 OLD = {
     r"hears?|heard|hearing": "receive",
     r"ledger|receipts?": "accounting, acknowledgement",
     r"Indoors|Inlet|Outlet|\w+Door|DoorParams": "IntraProcessBus, ValueQueue, LocalPublisher, NodeBase",
-    r"telling|tells": "report, state, know",
+    r"tell(?:s|ing|_\w+)?|_?told(?:_\w+)?|\w+_told|_tell\w*": "report, state, given, known",
+    r"[Ss]tory|[Ss]tories|write_story|make_story|chapters?": "RunSummary, run; RecordingPlan, plan",
+    r"Thing|Pace|Course|Shelf|odometry_words|camera_words_of|closure_words": "UnnamedPixels, FrameOrder",
     r"chains_disagree|few_objects_explained": "proposers_disagree, few_objects_matched",
 }
-PRODUCT = ("objreg_ros", "docs", "launch", "config")
-LEFT_OUT = ("docs/releases", "docs/tried.md", "objreg_ros/simulation")
+KEPT = re.compile(r'file\.tell\(\)|"told(\.npy)?"')  # Python's name of a place in a file; a member of saved maps
+PRODUCT = ("objreg_ros", "objreg_mapper", "objreg_tools", "docs", "launch", "config")
+LEFT_OUT = ("docs/releases", "docs/tried.md", "objreg_tools/simulation")
 
 
 def lines_with(repository: Path, pattern: str) -> list[str]:
@@ -30,13 +31,14 @@ def lines_with(repository: Path, pattern: str) -> list[str]:
             if path.suffix not in (".py", ".md", ".j2", ".yaml") or name.startswith(LEFT_OUT):
                 continue
             lines = path.read_text(encoding="utf-8").splitlines()
+            lines = [KEPT.sub("", line) for line in lines]
             found += [f"{name}:{k}: {line.strip()}" for k, line in enumerate(lines, 1) if said.search(line)]
     return found
 
 
-@pytest.mark.parametrize("pattern", OLD)
-def test_an_old_word_is_said_no_more(repository: Path, pattern: str) -> None:
-    assert not lines_with(repository, pattern), f"say: {OLD[pattern]}"
+def test_an_old_word_is_said_no_more(repository: Path) -> None:
+    for pattern in OLD:
+        assert not lines_with(repository, pattern), f"say: {OLD[pattern]}"
 
 
 def test_a_word_that_is_said_is_found(repository: Path) -> None:

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from distributed import LocalCluster
 
-from objreg_ros import workers
-from objreg_ros.workers import LIVES, Done, spread
+from objreg_tools import workers
+from objreg_tools.workers import LIVES, Done, spread
 
 
 def halve(number: int) -> int:

@@ -17,14 +17,11 @@ import cv2
 import numpy as np
 
 from objreg_ros import share
-from objreg_ros.cli.simulate import camera_of, distortion_of, sensors_of
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose_error
-from objreg_ros.offline import Stages, run_offline
-from objreg_ros.recording import open_recording
-from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
@@ -32,15 +29,19 @@ from objreg_ros.registration.gate.kinds import KINDS, readings_of
 from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.gate.verdict import check_rules, compared, judge
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN
 from objreg_ros.registration.propose.prior import Prior
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.organise import organise
-from objreg_ros.simulation.camera import SENSORS
-from objreg_ros.simulation.write import simulate
-from objreg_ros.truth import Truth
+from objreg_tools.cli.commands.simulate import camera_of, distortion_of, sensors_of
+from objreg_tools.offline.line import run_offline
+from objreg_tools.offline.stages import Stages
+from objreg_tools.recording import open_recording
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.simulation.sensors.camera import SENSORS
+from objreg_tools.simulation.write import simulate
+from objreg_tools.truth import Truth
 
 SCENARIOS = ("loop", "opposite", "posters", "moved")
 RIGS = {
@@ -111,7 +112,7 @@ class Rows:
         return rows
 
 
-def stories(first_seed: int) -> list[Told]:
+def plans(first_seed: int) -> list[Told]:
     """Every scenario by every sensor, in every rig, each in a room of its own."""
     chosen = [(scenario, sensor, rig) for rig in RIGS for scenario in SCENARIOS for sensor in SENSORS]
     return [Told(*one, first_seed + k) for k, one in enumerate(chosen)]
@@ -167,14 +168,14 @@ def rows_of(
         yield (*pose_error(one.T_target_source, T_true), refused, pair, rank, *readings)
 
 
-def gather(story: Told) -> Rows:
+def gather(plan: Told) -> Rows:
     """The rows of one recording, which is gone afterwards."""
     cv2.setNumThreads(1)
-    camera = camera_of(SENSORS[story.sensor][0], None)
-    sensors = sensors_of(camera, story.rig == "stress", RIGS[story.rig], story.sensor)
+    camera = camera_of(SENSORS[plan.sensor][0], None)
+    sensors = sensors_of(camera, plan.rig == "stress", RIGS[plan.rig], plan.sensor)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording"
-        simulate(path, story.scenario, story.seed, FRAMES, RATE, sensors=sensors, jpeg=True, threads=1)
+        simulate(path, plan.scenario, plan.seed, FRAMES, RATE, sensors=sensors, jpeg=True, threads=1)
         with open_recording(path) as recording:
             inputs = choose_inputs(recording.topics)
             params = RegistrarParams().replaced(**EAGER)
@@ -186,4 +187,4 @@ def gather(story: Told) -> Rows:
             run_offline(recording.records(set(inputs.chosen().values())), stages, inputs)
             registrar.finish()
             registrar.close()
-    return recorder.rows(story.sensor)
+    return recorder.rows(plan.sensor)

@@ -20,7 +20,7 @@ import onnx
 import torch
 from torch import nn
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from training.embedded import Embedded, FromPixels
 from training.labels import LABELS
 from training.network import MobileNetSsd
@@ -81,7 +81,7 @@ def provenance_of(checkpoint: Mapping[str, object]) -> dict[str, str]:
     return {
         "licence": "Apache-2.0",
         "trained_by": "training/ of objreg_ros, from random weights",
-        "trained_on": "pictures of objreg_ros.simulation only",
+        "trained_on": "pictures of objreg_tools.simulation only",
         "steps": str(checkpoint["step"]),
         "seconds": f"{checkpoint['seconds']:.0f}",
         "command": str(checkpoint["command"]),

@@ -16,14 +16,14 @@ import click
 import numpy as np
 from tqdm import tqdm
 
-from objreg_ros.cli.simulate import HARD
-from objreg_ros.data import DepthImage, Detections, Intrinsics
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.sensor import CONFIDENCE, SIGMA_DEG
-from objreg_ros.simulation.camera import CAMERAS, SENSORS
-from objreg_ros.simulation.params import StressParams
-from objreg_ros.simulation.render import render
-from objreg_ros.simulation.scenarios import SCENARIOS, make_story
+from objreg_tools.cli.commands.simulate import HARD
+from objreg_tools.simulation.params import StressParams
+from objreg_tools.simulation.rendering.render import render
+from objreg_tools.simulation.scenarios import SCENARIOS, make_plan
+from objreg_tools.simulation.sensors.camera import CAMERAS, SENSORS
 
 MARGIN = 1.5
 EDGES = (
@@ -44,10 +44,10 @@ def tilts(seeds: int, frames: int) -> Iterator[tuple[float, float]]:
     for sensor, scenario, seed in tqdm(runs, unit="room"):
         name, depth = SENSORS[sensor]
         camera = CAMERAS[name]
-        story, segmenter = make_story(scenario, seed + 500, frames), Segmenter()
+        plan, segmenter = make_plan(scenario, seed + 500, frames), Segmenter()
         stress = StressParams.from_mapping(HARD if seed % 2 else {})
-        for k, T_world_camera in enumerate(story.T_world_camera):
-            scene = story.scenes[story.scene_of[k]]
+        for k, T_world_camera in enumerate(plan.T_world_camera):
+            scene = plan.scenes[plan.scene_of[k]]
             seen = render(scene, T_world_camera, camera, seed=k, depth=depth, stress=stress, with_colour=False)
             frame = segmenter.segment(nothing(seen.depth.shape), image_of(seen.depth, camera))
             if frame.gravity is not None:

@@ -24,12 +24,12 @@ import numpy as np
 from scipy.optimize import minimize
 from tqdm import tqdm
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.gate import weights as shipped
 from objreg_ros.registration.gate.kinds import KINDS
 from objreg_ros.registration.gate.likelihood import ODDS
-from objreg_ros.truth import FALSE, LOOSE
-from training.evidence import Rows, gather, stories
+from objreg_tools.truth import FALSE, LOOSE
+from training.evidence import Rows, gather, plans
 
 PENALTY = 1e-3  # of squared weights: what the rows hardly constrain weighs little
 LARGEST = 8.0  # natural logarithm that one step of a weight may have
@@ -65,7 +65,7 @@ def steps_of(readings: Array) -> tuple[Array, list[tuple[str, str]]]:
 
 def fit(rows: Rows) -> Fit:
     """The most likely weights of rows that are right or false; what is between is left out."""
-    right, false = told_of(rows)
+    right, false = begun_summary(rows)
     known = right | false
     steps, names = steps_of(rows.readings[known])
     sign, share = np.where(right[known], 1.0, -1.0), balanced(right[known])
@@ -112,7 +112,7 @@ def log_odds(found: Fit, readings: Array) -> Array:
     return total
 
 
-def told_of(rows: Rows) -> tuple[Array, Array]:
+def begun_summary(rows: Rows) -> tuple[Array, Array]:
     """Which rows (N,) are loosely right, and which are false."""
     return np.asarray((rows.error < LOOSE).all(axis=1)), np.asarray((rows.error > FALSE).any(axis=1))
 
@@ -133,7 +133,7 @@ def reliability(rows: Rows, odds: Array) -> list[dict[str, float]]:
 
     Foretold as if as many false as right poses were asked about, brought to how many there are.
     """
-    right, false = told_of(rows)
+    right, false = begun_summary(rows)
     prior = right.sum() / max(1, false.sum())
     table = []
     for least in THRESHOLDS:
@@ -154,7 +154,7 @@ def reliability(rows: Rows, odds: Array) -> list[dict[str, float]]:
 
 def closable(rows: Rows) -> int:
     """How many pairs there are whose best pose is right."""
-    right, _ = told_of(rows)
+    right, _ = begun_summary(rows)
     return int((right & (rows.rank == 0)).sum())
 
 
@@ -208,7 +208,7 @@ def main() -> None:
 def gather_command(first_seed: int, out: Path, processes: int) -> None:
     """Simulate rooms by every sensor, and write what the gate sees; what is there already is left as it is."""
     out.mkdir(parents=True, exist_ok=True)
-    todo = [one for one in stories(first_seed) if not (out / f"{one.name}.npz").exists()]
+    todo = [one for one in plans(first_seed) if not (out / f"{one.name}.npz").exists()]
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork")) as pool:
         for one, rows in zip(todo, tqdm(pool.map(gather, todo), total=len(todo), unit="recording"), strict=True):
             rows.save(out / f"{one.name}.npz")
@@ -259,7 +259,7 @@ def subset(rows: Rows, chosen: Array) -> Rows:
 
 def reliability_at(rows: Rows, odds: Array, least: float) -> float:
     """The share of the pairs whose best pose is right of which the gate accepts a right one."""
-    right, _ = told_of(rows)
+    right, _ = begun_summary(rows)
     return float((accepted(rows, odds, least) & right).sum() / max(1, closable(rows)))
 
 

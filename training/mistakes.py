@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from objreg_ros.data import Array, ColourImage, Detections
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.detector.boxes import iou
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams

@@ -17,7 +17,7 @@ from onnx import numpy_helper
 from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from training.embedded import CENTRE, SCALE
 
 INPUT = "rgb"

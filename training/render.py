@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from objreg_ros.data import Array, Intrinsics
-from objreg_ros.simulation.params import ColourParams
-from objreg_ros.simulation.render import Rendering, render
-from objreg_ros.simulation.scene import Scene, random_view
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import Intrinsics
+from objreg_tools.simulation.params import ColourParams
+from objreg_tools.simulation.rendering.render import Rendering, render
+from objreg_tools.simulation.world.scene import Scene, random_view
 from training.augment import background
 from training.labels import LABELS
 from training.priors import INPUT_HW

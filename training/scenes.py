@@ -10,16 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.simulation import furniture, texture
-from objreg_ros.simulation.distractors import make_distractor
-from objreg_ros.simulation.light import Lamp, looking
-from objreg_ros.simulation.mesh import Material, Mesh, box
-from objreg_ros.simulation.model import ObjectModel, turn
-from objreg_ros.simulation.objects import LABELS, make_object
-from objreg_ros.simulation.scenarios import SCENARIOS, make_story
-from objreg_ros.simulation.scene import (
+from objreg_tools.simulation.rendering.light import Lamp, looking
+from objreg_tools.simulation.scenarios import SCENARIOS, make_plan
+from objreg_tools.simulation.world import furniture, texture
+from objreg_tools.simulation.world.distractors import make_distractor
+from objreg_tools.simulation.world.mesh import Material, Mesh, box
+from objreg_tools.simulation.world.model import ObjectModel, turn
+from objreg_tools.simulation.world.objects import LABELS, make_object
+from objreg_tools.simulation.world.scene import (
     Place,
     Placed,
     Scene,
@@ -35,7 +35,7 @@ Rng = np.random.Generator
 Laid = list[tuple[ObjectModel, Array]]
 
 
-STORY_FRAMES = 120
+PLAN_FRAMES = 120
 """A story of so few frames costs little and passes every place."""
 
 
@@ -54,8 +54,8 @@ def training_scene(rng: Rng) -> tuple[Scene, Array]:
     if kind < 0.4:
         scene = random_scene(_seed(rng), distractor_share=rng.uniform(0.1, 0.6))
     elif kind < 0.65:
-        story = make_story(str(rng.choice(list(SCENARIOS))), _seed(rng), STORY_FRAMES, occluders=int(rng.integers(3)))
-        scene, poses = story.scenes[0], story.T_world_camera[story.scene_of == 0]
+        plan = make_plan(str(rng.choice(list(SCENARIOS))), _seed(rng), PLAN_FRAMES, occluders=int(rng.integers(3)))
+        scene, poses = plan.scenes[0], plan.T_world_camera[plan.scene_of == 0]
     elif kind < 0.8:
         scene = desk(rng)
     else:
@@ -93,9 +93,9 @@ def with_look_alikes(scene: Scene, rng: Rng) -> Scene:
 
 def _story(rng: Rng) -> tuple[Scene, Array]:
     """One of the scenes of a scenario and the camera poses in it."""
-    story = make_story(str(rng.choice(list(SCENARIOS))), _seed(rng), STORY_FRAMES)
-    chosen = int(rng.integers(len(story.scenes)))
-    return story.scenes[chosen], story.T_world_camera[story.scene_of == chosen]
+    plan = make_plan(str(rng.choice(list(SCENARIOS))), _seed(rng), PLAN_FRAMES)
+    chosen = int(rng.integers(len(plan.scenes)))
+    return plan.scenes[chosen], plan.T_world_camera[plan.scene_of == chosen]
 
 
 def desk(rng: Rng) -> Scene:

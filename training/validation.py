@@ -2,7 +2,7 @@
 """Pictures to judge a model by, and the judgement, made by the very detector that will run it.
 
 The pictures are 640 x 480 ones of the simulator's Kinect with its default noise: one half of ordinary rooms
-(`random_scene`) from hand-held views (`random_view`), the other half frames of its scenarios (`make_story`). No
+(`random_scene`) from hand-held views (`random_view`), the other half frames of its scenarios (`make_plan`). No
 training picture shares a scene with them: training draws the numbers of its scenes below `FIRST_SCENE`.
 """
 
@@ -19,13 +19,14 @@ from pathlib import Path
 
 import numpy as np
 
-from objreg_ros.data import Array, ColourImage, Detections
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.report.run.average_precision import TrueBoxes, average_precision
-from objreg_ros.simulation.render import Rendering, render
-from objreg_ros.simulation.scenarios import SCENARIOS, make_story
-from objreg_ros.simulation.scene import Scene, random_scene, random_view
+from objreg_tools.report.run.average_precision import TrueBoxes, average_precision
+from objreg_tools.simulation.rendering.render import Rendering, render
+from objreg_tools.simulation.scenarios import SCENARIOS, make_plan
+from objreg_tools.simulation.world.scene import Scene, random_scene, random_view
 from training.labels import LABELS
 from training.samples import Sample, Shard, write_shard
 
@@ -33,7 +34,7 @@ FIRST_SCENE = 2**31
 SCENES_PER_SEED = 10_000
 VIEWS_PER_SCENE = 6
 PICTURES_PER_ROUND = 2 * VIEWS_PER_SCENE
-STORY_FRAMES = 120
+PLAN_FRAMES = 120
 
 
 @dataclass(frozen=True)
@@ -112,9 +113,9 @@ def _views(number: int) -> Iterator[tuple[Scene, Array]]:
     """Scenes and ``T_world_camera`` of one round."""
     scene = random_scene(number)
     yield from ((scene, random_view(scene, number + view)) for view in range(VIEWS_PER_SCENE))
-    story = make_story(list(SCENARIOS)[number % len(SCENARIOS)], number, STORY_FRAMES)
-    for frame in np.linspace(0, STORY_FRAMES - 1, VIEWS_PER_SCENE + 2).astype(int)[1:-1]:
-        yield story.scenes[story.scene_of[frame]], story.T_world_camera[frame]
+    plan = make_plan(list(SCENARIOS)[number % len(SCENARIOS)], number, PLAN_FRAMES)
+    for frame in np.linspace(0, PLAN_FRAMES - 1, VIEWS_PER_SCENE + 2).astype(int)[1:-1]:
+        yield plan.scenes[plan.scene_of[frame]], plan.T_world_camera[frame]
 
 
 def labelled(rendering: Rendering) -> Labelled:

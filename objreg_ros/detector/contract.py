@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.detector.picture import Look
 from objreg_ros.detector.runtime import Port
 

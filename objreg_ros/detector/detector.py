@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from objreg_ros.data import Array, ColourImage, Detections
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.detector.boxes import area, clip, suppress
 from objreg_ros.detector.contract import Candidates, Contract, Graph
 from objreg_ros.detector.labels import NO_CLASS, find_labels

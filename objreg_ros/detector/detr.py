@@ -8,13 +8,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.detector.contract import Candidates, Graph, best_class, class_index, corners, shapes
 from objreg_ros.detector.picture import Look
 from objreg_ros.detector.yolo import in_shares
 
 STRETCHED = Look(mean=0.0, scale=1 / 255)
-TOLD, QUERIED = ("labels", "boxes", "scores"), ("logits", "pred_boxes")
+DECODED, QUERIED = ("labels", "boxes", "scores"), ("logits", "pred_boxes")
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class DetrOutput:
 
     labels: int
     hw: tuple[int, int]
-    names: ClassVar[tuple[str, ...]] = TOLD
+    names: ClassVar[tuple[str, ...]] = DECODED
     look: ClassVar[Look] = STRETCHED
 
     @classmethod

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.detector.contract import Candidates, Graph, best_class, corners, require_rows
 from objreg_ros.detector.picture import Look
 from objreg_ros.detector.yolo import in_shares

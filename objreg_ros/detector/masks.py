@@ -6,7 +6,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, Detections
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import Detections
 from objreg_ros.detector.contract import Candidates
 from objreg_ros.detector.picture import Place
 

@@ -12,16 +12,16 @@ from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros import share
-from objreg_ros.bridge.camera.pace import Pace
-from objreg_ros.bridge.messages import from_msg, to_msg, vision_to_msg
+from objreg_ros.bridge.camera.pace import RateLimit
+from objreg_ros.bridge.messages import from_msg, headers, to_msg, vision_to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.intra_process import IntraProcessBus, Surplus
 from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
-from objreg_ros.bridge.streams.frame_order import Turns
+from objreg_ros.bridge.process.intra_process import IntraProcessBus, Surplus
+from objreg_ros.bridge.streams.frame_order import FrameOrder
 from objreg_ros.bridge.streams.sync import Drop
-from objreg_ros.data import ColourImage
+from objreg_ros.data.images import ColourImage
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 
@@ -41,7 +41,7 @@ class DetectorNode(NodeBase):
         """Load the model, publish its labels, and subscribe."""
         params = self.settings.of(DetectorParams)
         self._detector = Detector.of(params, share.model)
-        self._pace, self._turns = Pace(params.max_rate), Turns(self._leave_out)
+        self._rate_limit, self._order = RateLimit(params.max_rate), FrameOrder(self._leave_out)
         self._names = dict(enumerate(self._detector.labels))
         self._table = self.offer(PointCloud2, "detections_table", qos.stage())
         array = vision_to_msg.Detection2DArray
@@ -60,15 +60,15 @@ class DetectorNode(NodeBase):
         return from_msg.image(message, self.most_pixels)
 
     def _receive(self, _: str, message: Any) -> None:
-        stamp_ns = from_msg.stamp_ns(message)
+        stamp_ns = headers.stamp_ns(message)
         self.accept(stamp_ns)
         if not self.let_in(stamp_ns):
             return
-        if self._pace.admits(stamp_ns):
-            self._turns.begin(stamp_ns)
+        if self._rate_limit.admits(stamp_ns):
+            self._order.begin(stamp_ns)
             self.worker.put((stamp_ns, message))
         else:
-            self._turns.put_off(stamp_ns, message.header.frame_id)
+            self._order.put_off(stamp_ns, message.header.frame_id)
 
     def _leave_out(self, stamp_ns: int, frame_id: str) -> None:
         """Report a surplus image, after the tables of those before it."""
@@ -80,11 +80,11 @@ class DetectorNode(NodeBase):
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
         """As any node; those behind it have their turn."""
         super().conclude(stamp_ns, work)
-        self._turns.end(stamp_ns)
+        self._order.end(stamp_ns)
 
     def _overtaken(self, job: tuple[int, Any]) -> None:
         super()._overtaken(job)
-        self._turns.end(job[0])
+        self._order.end(job[0])
 
     def compute(self, stamp_ns: int, payload: Any) -> bool:
         """One image."""

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.detector.runtime import Port
 
 EXPECTED = (

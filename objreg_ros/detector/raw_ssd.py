@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.detector.boxes import decode
 from objreg_ros.detector.contract import Candidates, Graph, shapes
 from objreg_ros.detector.picture import AGAIN, Look

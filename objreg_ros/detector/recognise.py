@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from objreg_ros.detector.contract import Contract, Graph, shapes
-from objreg_ros.detector.detr import QUERIED, TOLD, DetrOutput, DetrQueries, DetrRows
+from objreg_ros.detector.detr import DECODED, QUERIED, DetrOutput, DetrQueries, DetrRows
 from objreg_ros.detector.grid import NanoDet, YoloX, strides_of
 from objreg_ros.detector.picture import SIZES
 from objreg_ros.detector.raw_ssd import RawSsd
@@ -32,7 +32,7 @@ def recognise(graph: Graph, named: str = "auto") -> Contract:
     if named in ("auto", "detr") and set(QUERIED) <= set(graph.probe):
         return DetrQueries.of(graph)
     sizes = any(port.name == SIZES for port in graph.inputs)
-    if set(TOLD) <= set(graph.probe) and (named == "detr" or (named == "auto" and sizes)):
+    if set(DECODED) <= set(graph.probe) and (named == "detr" or (named == "auto" and sizes)):
         return DetrOutput.of(graph)
     if named == "tf_detection" or (named == "auto" and _is_tf_detection(graph)):
         return TfDetection.of(graph)

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import onnxruntime
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 
 REMEDY = "check the download, or export the model again"
 SPIN_US = 10

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.detector.contract import Candidates, Graph, class_index, shapes
 from objreg_ros.detector.picture import Look
 from objreg_ros.detector.runtime import Port

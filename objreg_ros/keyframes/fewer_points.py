@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from objreg_ros.data import Array, ObjectCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.registration.keyframe import Keyframe, KeyObject
 
 NEAREST_M = 0.01  # no camera measures depth so near

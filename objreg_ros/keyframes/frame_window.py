@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.registration.keyframe import Keyframe
 

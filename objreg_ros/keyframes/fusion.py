@@ -10,14 +10,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objreg_ros.data import UNNAMED, Array, Frame, ObjectCloud, PointFlag, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import UNNAMED, Frame, ObjectCloud, PointFlag, View
 from objreg_ros.geometry import inverse, rigid, rotate, transform
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.own_size import FRAME_POINTS, OBJECT_POINTS, best, sized_context, thinned
 from objreg_ros.keyframes.tracking import SAME_PICTURE, TrackedSurface, same_picture, tracked_surface, view_motion
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject, bounding_box
 from objreg_ros.registration.labels import LabelGroups
-from objreg_ros.registration.params import KeyframeParams
+from objreg_ros.registration.params import ContextParams
 from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.registration.prepare.voxels import _keys, thin
 
@@ -29,7 +30,7 @@ CUT = np.uint16(PointFlag.CUT_BY_IMAGE | PointFlag.CUT_BY_BOX)
 CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders between neighbouring frames
 
 
-def fuse(window: FrameWindow, params: KeyframeParams) -> Keyframe:
+def fuse(window: FrameWindow, params: ContextParams) -> Keyframe:
     """The keyframe of a frame window, in the camera frame of its reference; its id is 0 until a store gives one."""
     chosen = reference_index(window.frames)
     reference = window.frames[chosen]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 
 LEAST_PAIRS = 24  # fewer measure nothing
 MOST_PAIRS = 1024  # that are kept, the newest

@@ -13,15 +13,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from objreg_ros.data import JUMP_NS, UNNAMED, Array, Frame
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import JUMP_NS, UNNAMED, Frame
 from objreg_ros.geometry import inverse, leaps, rigid, rotation_angle
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers, alone, with_gravity_of
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.keyframes.own_size import sized_frame
+from objreg_ros.keyframes.params import KeyframeParams
 from objreg_ros.keyframes.tracking import SAME_PICTURE, TrackedSurface, same_picture, tracked_surface, view_motion
 from objreg_ros.keyframes.turn import LastPicture
-from objreg_ros.registration.params import KeyframeParams
 
 MOST_FRAMES = 4  # that are fused into one keyframe
 LEAST_OBJECTS = 1  # of a keyframe: one without objects proposes nothing

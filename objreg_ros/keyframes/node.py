@@ -15,20 +15,21 @@ from sensor_msgs.msg import CompressedImage
 
 from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe, keyframe
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.intra_process import IntraProcessBus
-from objreg_ros.bridge.node.lifetime import await_kernels
-from objreg_ros.bridge.node.params import KeyParams, ManagedParams
+from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.node.worker import Backlog, Limit
+from objreg_ros.bridge.process.intra_process import IntraProcessBus
+from objreg_ros.bridge.process.lifetime import await_kernels
 from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import read_key
+from objreg_ros.bridge.streams.params import KeyParams
 from objreg_ros.bridge.streams.sync import Match
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import SILENCE_S, Keyframer
+from objreg_ros.keyframes.params import KeyframeParams, KeyframerNodeParams
 from objreg_ros.keyframes.warm import warm
 from objreg_ros.memory.compact import pack_keyframe
-from objreg_ros.registration.params import KeyframeParams, KeyframerNodeParams
 
 LOOK_S = 1.0  # between two looks at whether frames still come
 WAITING = Limit(8, 200_000_000, math.inf)  # keyframes that wait to be fused and packed

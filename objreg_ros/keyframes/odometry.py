@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, rotation_angle
 
 TURNS_DEG_S = 360.0  # nothing turns faster for long

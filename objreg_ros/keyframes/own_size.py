@@ -13,7 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.data import Array, Frame, ObjectCloud, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame, ObjectCloud, View
 from objreg_ros.keyframes.fewer_points import picked
 from objreg_ros.registration.keyframe import Context, Keyframe
 

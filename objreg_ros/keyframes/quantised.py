@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.sensor import depth_sigma
 
 DEPTH_STEP = 0.0008  # of the depth: 0.8 mm at 1 m, where a Kinect's noise is 1.9 mm, 2.4 mm at 3 m, where it is 14 mm

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import float64, njit
 
-from objreg_ros.data import Array, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.sensor import TRACKING_SIGMA_GROWTH, TRACKING_SIGMA_M

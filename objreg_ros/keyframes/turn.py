@@ -14,7 +14,8 @@ import cv2
 import numpy as np
 from numba import njit
 
-from objreg_ros.data import Array, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import pose, rotation_angle, rotation_from_vector
 
 WIDTHS = (20, 40)  # px of the pictures, coarse to fine

@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame, Intrinsics, ObjectCloud, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame, ObjectCloud, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Keyframer
-from objreg_ros.registration.params import KeyframeParams
+from objreg_ros.keyframes.params import KeyframeParams
 
 CAMERA = Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120)
 

@@ -14,7 +14,10 @@ from typing import Any
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.data import Array, Intrinsics, LoopClosure, ObjectCloud, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import ObjectCloud, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project, is_rigid
 from objreg_ros.memory.checksum import (
     require_keyframe,

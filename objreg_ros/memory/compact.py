@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.data import SURROGATE, Array, ObjectCloud, View
+from objreg_ros.data.checked import SURROGATE, Array
+from objreg_ros.data.frames import ObjectCloud, View
 from objreg_ros.geometry import back_project
 from objreg_ros.keyframes import quantised
 from objreg_ros.keyframes.columns import Columns, column

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array, ObjectCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import ObjectCloud
 
 PAIRS = 512
 DISTANCE_EDGES = np.array([0, 0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6, np.inf])

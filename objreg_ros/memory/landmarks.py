@@ -17,11 +17,11 @@ from math import prod
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.memory.known import Known, Last, last_of
+from objreg_ros.memory.params import MemoryParams
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.labels import LabelGroups
-from objreg_ros.registration.params import RegistrarParams
 
 RADIUS_M = 0.1  # an object seen again within this is the same landmark
 MIDDLE_WANDERS = 0.2  # of the extent
@@ -75,7 +75,7 @@ class Landmarks:
     ``first`` is the id of the first new one. What a keyframe costs here does not grow with the number of landmarks.
     """
 
-    def __init__(self, params: RegistrarParams, sightings: Iterable[Sighting] = (), first: int = 1) -> None:
+    def __init__(self, params: MemoryParams, sightings: Iterable[Sighting] = (), first: int = 1) -> None:
         self._params = params
         self._groups = LabelGroups(params.label_groups)
         self._known: dict[int, Known] = {}  # the one seen last comes last

@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.memory.descriptor import EMPHASIS, SIZE
+from objreg_ros.memory.params import MemoryParams
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.kernels.projection import FAST
-from objreg_ros.registration.params import RegistrarParams
 
 LANES = 64
 NOWHERE = np.float32(np.inf)  # half the squared length of a row that is free
@@ -87,7 +87,7 @@ class Block:
         self._free.append(i)
 
     def nearest(
-        self, sighting: Sighting, params: RegistrarParams, most: int, margin: float, sessions: Sessions = NO_SESSIONS
+        self, sighting: Sighting, params: MemoryParams, most: int, margin: float, sessions: Sessions = NO_SESSIONS
     ) -> tuple[Array, Array]:
         """The rows (at most ``most``) that look most like this one, and half their squared distances, (K,) each.
 

@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.memory.nearest_neighbours import Block, Sessions
+from objreg_ros.memory.params import MemoryParams
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.labels import LabelGroups
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.prior import TIGHT_TRANSLATION_M
 
 VOTE_DISTANCE = 0.5  # distance of descriptors at which a vote falls to 0.6
@@ -52,7 +52,7 @@ class CandidateKeyframe(NamedTuple):
 class Index:
     """The objects of a store in memory, about 300 bytes each."""
 
-    def __init__(self, params: RegistrarParams) -> None:
+    def __init__(self, params: MemoryParams) -> None:
         self.params = params
         self._groups = LabelGroups(params.label_groups)
         self._blocks: dict[str, Block] = {}  # by label group

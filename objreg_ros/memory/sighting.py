@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import transform
 from objreg_ros.memory.descriptor import describe
 from objreg_ros.registration.keyframe import Keyframe

@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.keyframes.recent import RecentKeyframes
 from objreg_ros.memory.checksum import HEAD, require_head
 from objreg_ros.memory.claim import Claim, StoreError

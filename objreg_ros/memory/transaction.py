@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.checksum import LIGHT, require_light, sealed_light
 from objreg_ros.memory.codec import closure_row
 from objreg_ros.memory.counters import Counters, count

@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from objreg_ros.data import Array, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import pose
 from objreg_ros.plausibility.corner_tracks import Span
 from objreg_ros.sensor import GAUSSIAN, TRACKING_SIGMA_GROWTH, TRACKING_SIGMA_M

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
 
 MOST_CORNERS = 120
 LEAST_CORNERS = 12  # with depth at both ends of a span

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import quaternion_from_rotation
 from objreg_ros.plausibility.camera_fit import CameraFit
 from objreg_ros.plausibility.finding import Finding

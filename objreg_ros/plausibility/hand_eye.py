@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, rotation_from_vector
 
 TURN_SIGMA, TURN_GROWTH = np.radians(0.5), 0.03  # of a measured turn, and its growth with it

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.plausibility.hand_eye import best_rotation, turns_of
 
 LEAST_TURN = np.radians(3.0)  # a smaller one is no evidence
@@ -91,5 +91,5 @@ def find_shift(motions: Callable[[float], tuple[Array, Array]], T_camera: Array,
     fine = best + np.arange(-STEP_S, STEP_S + FINE_S / 2, FINE_S)
     found = min((Shift(float(seconds), at(float(seconds))) for seconds in fine), key=lambda shift: shift.likeness.off)
     others = [*coarse[np.abs(grid - best) > ELSEWHERE_S], *([at(0.0).off] if abs(found.seconds) > FINE_S else [])]
-    told_apart = found.likeness.off < CLEARLY * min(others, default=1.0)
-    return found if found.likeness.share >= FOUND and told_apart and abs(found.seconds) >= LEAST_SHIFT_S else None
+    is_distinct = found.likeness.off < CLEARLY * min(others, default=1.0)
+    return found if found.likeness.share >= FOUND and is_distinct and abs(found.seconds) >= LEAST_SHIFT_S else None

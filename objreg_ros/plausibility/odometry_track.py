@@ -8,7 +8,8 @@ from collections import deque
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from objreg_ros.data import Array, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import pose
 
 APART_NS = 20_000_000  # samples that are nearer to the last one are left out

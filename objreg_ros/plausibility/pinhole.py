@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Intrinsics
+from objreg_ros.data.images import Intrinsics
 
 LEAST_FOCAL, MOST_FOCAL = 0.18, 2.9  # of the longer side of the picture: a field of view of 140 and of 20 degrees
 MOST_ASPECT = 1.5  # between the focal lengths of columns and rows

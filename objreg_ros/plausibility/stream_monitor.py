@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import JUMP_NS, Array, Intrinsics, Odometry, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import JUMP_NS, Odometry, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverses, rotation_angle
 from objreg_ros.plausibility import findings
 from objreg_ros.plausibility.camera_fit import MOST_MISFIT, CameraFit, fit_camera

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from objreg_ros.data import Frame, LoopClosure, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.frames import Frame
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.memory.sighting import Sighting
@@ -13,12 +14,12 @@ from objreg_ros.memory.store import Store
 from objreg_ros.registrar.closure import Accepted, Waiting, redundant, rejected, waiting_of
 from objreg_ros.registrar.confirmation import Confirmation, Held
 from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registrar.relocalisation import Relocalisation
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 
 UNPROVEN = Reason.CAMERA, "too little of the stream was seen to believe its camera"
 MOST_CAMERAS = 64  # of all robots that are followed

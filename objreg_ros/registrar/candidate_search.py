@@ -12,16 +12,16 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
-from objreg_ros.data import Reason, Rejected
+from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.closure import Accepted, redundant, rejected
 from objreg_ros.registrar.confirmation import Confirmation, Held, Tried
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.prior import expect
 
 

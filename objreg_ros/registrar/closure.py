@@ -8,16 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objreg_ros.data import UNNAMED, Array, LoopClosure, ObjectMatch, Observation, Reason, Rejected
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure, ObjectMatch, Observation, Reason, Rejected
+from objreg_ros.data.frames import UNNAMED
 from objreg_ros.geometry import transform
 from objreg_ros.memory.landmarks import Link
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registrar.consistency import Support
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of
 from objreg_ros.registration.gate.verdict import Refusal
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.result import evidence_of
 
 

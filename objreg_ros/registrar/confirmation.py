@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Reason, Rejected
+from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.registrar.closure import Accepted, Waiting, rejected
 from objreg_ros.registrar.consistency import Consistency, Standpoint, Statement, Support
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import spread_of
 from objreg_ros.registration.gate.likelihood import odds_of
@@ -23,7 +24,6 @@ from objreg_ros.registration.gate.limits import limits_of
 from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.gate.verdict import check_possible
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.prior import Prior
 from objreg_ros.registration.result import Registration
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse
 from objreg_ros.keyframes.jitter import ENDS, Jitter, JitterMeter
 from objreg_ros.registration.keyframe import Keyframe

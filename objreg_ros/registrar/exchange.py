@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from objreg_ros.data import framed
+from objreg_ros.data.closures import framed
 from objreg_ros.keyframes.frame_window import Clock
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import sightings_of
@@ -109,7 +109,7 @@ class Exchange:
             try:
                 return self._sent("summaries", pack_summary(summary))
             except ValueError:
-                self.counters["dropped: too large to be told"] += 1
+                self.counters["dropped: too large to announce"] += 1
                 return None
 
     def sender(self, packed: bytes) -> str:

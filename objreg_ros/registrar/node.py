@@ -16,28 +16,29 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from objreg_ros.bridge.messages.markers import Scene
-from objreg_ros.bridge.node.intra_process import IntraProcessBus
-from objreg_ros.bridge.node.lifetime import await_kernels
 from objreg_ros.bridge.node.node_base import DroppedError
-from objreg_ros.bridge.node.params import ExchangeParams, KeyParams, ManagedParams, PeerParams, RelocalisedParams
+from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.node.worker import Backlog, Limit
+from objreg_ros.bridge.process.intra_process import IntraProcessBus
+from objreg_ros.bridge.process.lifetime import await_kernels
 from objreg_ros.bridge.streams.announcements import Announcements
 from objreg_ros.bridge.streams.exchanging import Delivered, Exchanging
 from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import read_key
 from objreg_ros.bridge.streams.keyframes_in import FromRobot, KeyframesIn
+from objreg_ros.bridge.streams.params import ExchangeParams, KeyParams, PeerParams, RelocalisedParams
 from objreg_ros.bridge.streams.relocalised import Whereabouts
 from objreg_ros.bridge.streams.robots import prefixes_of
 from objreg_ros.bridge.streams.sync import Match
-from objreg_ros.data import framed
+from objreg_ros.data.closures import framed
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.registrar.exchange import Exchange
 from objreg_ros.registrar.origins import arrival_of
 from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
 PATIENCE_S = 1.0  # a newer keyframe waits before the search in hand is cut short, if some were overtaken of late
 WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
@@ -82,7 +83,7 @@ class RegistrarNode(FramesNode):
             refused.pop_all()
 
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
-        self._tracking, self._telling = threading.Lock(), threading.Lock()
+        self._tracking, self._announcing = threading.Lock(), threading.Lock()
         self._unsearched, self._scene = 0, Scene()
         self._may_reset = self.settings.of(PeerParams).allow_remote_reset
         self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
@@ -191,11 +192,11 @@ class RegistrarNode(FramesNode):
             return self._exchange.take(seen.packed, seconds, hurried)
         outcome = self._registrar.search(seen, seconds, hurried)
         if self._robot and outcome.keyframe_ns is not None:
-            self._others.tell(outcome.keyframe_ns, self._exchange.announce(outcome))
+            self._others.send(outcome.keyframe_ns, self._exchange.announce(outcome))
         return outcome
 
     def _publish(self, outcome: Outcome) -> None:
-        with self._telling:  # the searcher's thread and that of ~/save
+        with self._announcing:  # the searcher's thread and that of ~/save
             self._announcements.closures(outcome.closures)
             self._announcements.refusals(outcome.rejected)
             self._count()
@@ -224,8 +225,8 @@ class RegistrarNode(FramesNode):
         counts = {"stored unsearched": self._unsearched, "forgotten keyframes": self._counts["forgotten"]}
         counts |= {"waiting keyframes": len(self.searcher), "waiting poses": self._registrar.waiting}
         counts["frames without odometry"] = self.without_odometry
-        robots = self._keyframes.told() if self._robots else self._others.told() if self._robot else {}
-        return {**super().extra_diagnostics(), **stored, **counts, **robots, **self._announcements.told()}
+        robots = self._keyframes.diagnostics() if self._robots else self._others.diagnostics() if self._robot else {}
+        return {**super().extra_diagnostics(), **stored, **counts, **robots, **self._announcements.diagnostics()}
 
     # Services
 
@@ -247,7 +248,7 @@ class RegistrarNode(FramesNode):
                 return False, str(error)
         for job in waiting:
             self.drop(job.stamp_ns, "reset")
-        with self._telling:
+        with self._announcing:
             self._scene.clear()
         self._whereabouts.look()
         return True, "forgot every keyframe" + (f"; what was stored is in {aside}" if aside else "")

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
-from objreg_ros.data import framed
+from objreg_ros.data.closures import framed
 from objreg_ros.keyframes.frame_window import Arrival, Clock, SessionNumbers
 from objreg_ros.memory.compact import unpack_keyframe
 from objreg_ros.memory.store import Store

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from objreg_ros.data import LoopClosure, Observation, Rejected
+from objreg_ros.data.closures import LoopClosure, Observation, Rejected
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,14 +8,14 @@ from contextlib import suppress
 
 import numpy as np
 
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.closure import Accepted, Waiting, closure_of, links_of
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 
 
 class Recollection:

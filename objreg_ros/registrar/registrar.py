@@ -14,7 +14,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame, Reason, Relocalised
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Reason, Relocalised
+from objreg_ros.data.frames import Frame
 from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.memory.landmarks import Landmark
@@ -26,11 +28,11 @@ from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, S
 from objreg_ros.registrar.closure import observations, rejected
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 
 RECENT = 500  # landmarks that are reported after every keyframe
 
@@ -285,11 +287,8 @@ class Registrar:
         """What the stored keyframes that may show the same place come to; a refusal where none may."""
         candidates = self._recollection.index.query(sightings, track.hidden)
         if not candidates:
-            refusal = (
-                Reason.NO_CANDIDATE,
-                f"none of {len(self._recollection.index)} stored objects is alike and may be here",
-            )
-            return Found([], [], [rejected(keyframe.stamp_ns, keyframe, refusal, keyframe)])
+            detail = f"none of {len(self._recollection.index)} stored objects is alike and may be here"
+            return Found([], [], [rejected(keyframe.stamp_ns, keyframe, (Reason.NO_CANDIDATE, detail), keyframe)])
         return self._try(candidates, keyframe, track, budget)
 
     def _try(

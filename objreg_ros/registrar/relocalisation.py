@@ -16,7 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame, LoopClosure, Relocalised
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure, Relocalised
+from objreg_ros.data.frames import Frame
 from objreg_ros.geometry import inverse, pose, rigid, rotation_from_vector, turned_about, vector_from_rotation
 from objreg_ros.keyframes.keyframer import SILENCE_S
 from objreg_ros.keyframes.odometry import TravelledPath
@@ -96,7 +98,7 @@ class Relocalisation:
         self._origin: Array = np.zeros(3)  # of that, in odometry
         self._path = TravelledPath(np.eye(4))
         self._steps = deque([(began_ns, 0.0)], maxlen=MOST_STEPS)  # stamp, and the path until then
-        self._way_until_tie = 0.0
+        self._path_until_tie = 0.0
         self._agreeing, self._target_ns, self._by_odometry = 0, 0, False
 
     def follow(self, frame: Frame, session: int) -> None:
@@ -117,7 +119,7 @@ class Relocalisation:
             self._path.go(T_odom_camera)
             self._steps.append((stamp_ns, self._path.travelled))
 
-    def _way_until(self, stamp_ns: int) -> float:
+    def _path_until(self, stamp_ns: int) -> float:
         """Metres from the first frame to a stamp, or to the earliest step that is kept."""
         before = (metres for step_ns, metres in reversed(self._steps) if step_ns <= stamp_ns)
         return next(before, self._steps[0][1])
@@ -155,7 +157,7 @@ class Relocalisation:
         here = tie.statement.source
         T_map_here, self._covariance = fused([one.carried(here, way) for one, way in (*agreeing, (tie, 0.0))])
         self._T_map_odom = rigid(T_map_here @ inverse(here.T_session_camera))
-        self._origin, self._way_until_tie = here.T_session_camera[:3, 3], self._way_until(here.stamp_ns)
+        self._origin, self._path_until_tie = here.T_session_camera[:3, 3], self._path_until(here.stamp_ns)
 
     @property
     def relocalised(self) -> Relocalised | None:
@@ -172,7 +174,7 @@ class Relocalisation:
                 target_ns=self._target_ns,
                 T_map_odom=self._T_map_odom,
                 T_map_camera=T_map_camera,
-                covariance=turned_about(self._covariance, way) + drift(self._path.travelled - self._way_until_tie),
+                covariance=turned_about(self._covariance, way) + drift(self._path.travelled - self._path_until_tie),
                 closures=self._agreeing,
                 by_odometry=self._by_odometry,
             )

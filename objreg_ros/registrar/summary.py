@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.keyframes.frame_window import Clock
 from objreg_ros.memory.compact import MOST_SAID, MOST_WHOLE, pack_keyframe, real, text, unpack_keyframe, whole, within
 from objreg_ros.memory.descriptor import SIZE

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from objreg_ros.keyframes.warm import drawn
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registration.params import RegistrarParams
 
 GAP_S = 1.0  # beyond the least gap between two keyframes of a constraint
 

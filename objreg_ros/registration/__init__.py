@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from objreg_ros.registration.api import Gate, Method
     from objreg_ros.registration.keyframe import Keyframe
-    from objreg_ros.registration.params import RegistrarParams
+    from objreg_ros.registration.params import RegistrationParams
     from objreg_ros.registration.propose.prior import Prior
     from objreg_ros.registration.result import Registration
 
@@ -36,7 +36,7 @@ def align(
     source: Keyframe,
     target: Keyframe,
     prior: Prior | None = None,
-    params: RegistrarParams | None = None,
+    params: RegistrationParams | None = None,
     method: Method | None = None,
     gate: Gate | None = None,
 ) -> Registration:
@@ -50,10 +50,10 @@ def align(
     """
     from objreg_ros.registration.candidate import Candidate
     from objreg_ros.registration.certainty.covariance import covariance_of
-    from objreg_ros.registration.params import RegistrarParams
+    from objreg_ros.registration.params import RegistrationParams
     from objreg_ros.registration.result import Registration, evidence_of
 
-    params = params or RegistrarParams()
+    params = params or RegistrationParams()
     method, gate = method or method_of(params), gate or gate_of(params)
     for keyframe in (source, target):
         method.prepare(keyframe)
@@ -68,7 +68,7 @@ def align(
     return Registration(accepted=False, reason=reason, detail=detail, evidence=evidence, candidate=best)
 
 
-def method_of(params: RegistrarParams) -> Method:
+def method_of(params: RegistrationParams) -> Method:
     """The method that ``params.method`` names, ready for any number of pairs."""
     from objreg_ros.registration.engine import Engine
     from objreg_ros.registration.paper import PaperEngine
@@ -76,7 +76,7 @@ def method_of(params: RegistrarParams) -> Method:
     return PaperEngine(params) if params.method == "paper" else Engine(params)
 
 
-def gate_of(params: RegistrarParams) -> Gate:
+def gate_of(params: RegistrationParams) -> Gate:
     """Our gate with the limits that ``params`` set."""
     from functools import partial
 

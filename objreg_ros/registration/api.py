@@ -11,7 +11,8 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:  # so that this file is light: the kernels need a second to load
-    from objreg_ros.data import Alignment, Array
+    from objreg_ros.data.checked import Array
+    from objreg_ros.data.closures import Alignment
     from objreg_ros.registration.candidate import Candidate
     from objreg_ros.registration.gate.verdict import Refusal
     from objreg_ros.registration.keyframe import Keyframe

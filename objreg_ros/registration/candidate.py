@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Alignment, Array
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Alignment
 
 
 class ObjectPair(NamedTuple):

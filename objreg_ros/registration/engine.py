@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from objreg_ros.data import Alignment, Array
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Alignment
 from objreg_ros.registration.api import Proposer, Scorer
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of, spread_of, worst_translation
@@ -20,7 +21,7 @@ from objreg_ros.registration.certainty.gravity_update import gravity_update
 from objreg_ros.registration.certainty.observability import DOUBTFUL_SIGMA_M, better_pose, regularising_information
 from objreg_ros.registration.kernels.same_pose import AGREEING, near
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import RegistrationParams
 from objreg_ros.registration.prepare.prepared import Pair, PreparedCache
 from objreg_ros.registration.propose.competing_hypotheses import competing_poses
 from objreg_ros.registration.propose.evidence import (
@@ -47,7 +48,7 @@ class Engine:
     ``propose`` and ``score`` may be one's own: `registration.api`.
     """
 
-    def __init__(self, params: RegistrarParams, propose: Proposer = shortlist, score: Scorer = gather) -> None:
+    def __init__(self, params: RegistrationParams, propose: Proposer = shortlist, score: Scorer = gather) -> None:
         self._params = params
         self._shortlist, self._score = propose, score
         self._cache = PreparedCache(params)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objreg_ros.data import Array, ObjectCloud, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import ObjectCloud, View
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

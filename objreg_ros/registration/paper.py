@@ -10,17 +10,18 @@ method, with the same evidence.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from objreg_ros.data import Alignment, Array
+from objreg_ros import extra
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Alignment
 from objreg_ros.geometry import transform
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import merged
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import RegistrationParams
 from objreg_ros.registration.prepare.prepared import Prepared, PreparedCache
 from objreg_ros.registration.propose.evidence import gather, perturbation_margin_of
 
@@ -43,8 +44,8 @@ class _Icp:
 class PaperEngine:
     """Proposes a pose for each pair of objects of one label; the counterpart of `Engine`."""
 
-    def __init__(self, params: RegistrarParams) -> None:
-        import_module("open3d")  # now and not with the first pair: it takes seconds
+    def __init__(self, params: RegistrationParams) -> None:
+        extra.load("open3d", "paper", "method: paper")  # now and not with the first pair: it takes seconds
         self._cache = PreparedCache(params)
 
     def prepare(self, keyframe: Keyframe) -> None:

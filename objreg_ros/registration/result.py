@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from objreg_ros.data import Array, Reason
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Reason
 from objreg_ros.geometry import skew
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.gate.likelihood import odds_of

@@ -27,17 +27,19 @@ from objreg_ros.bridge.camera import colour_frame, lenses, registered_depth
 from objreg_ros.bridge.camera.calibration import fitted, read_calibration
 from objreg_ros.bridge.camera.mount import Mount
 from objreg_ros.bridge.camera.transforms import receive_frames
-from objreg_ros.bridge.messages import from_msg, rvl, to_msg, vision_to_msg
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers, motion_from_msg, rvl, to_msg, vision_to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.intra_process import IntraProcessBus, Surplus
-from objreg_ros.bridge.node.lifetime import await_kernels
 from objreg_ros.bridge.node.overridable import FIXED
 from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
+from objreg_ros.bridge.process.intra_process import IntraProcessBus, Surplus
+from objreg_ros.bridge.process.lifetime import await_kernels
 from objreg_ros.bridge.streams.detections_in import DetectionsIn
 from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream
 from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
-from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import FeltGravity, Frame
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, PointCloud
 from objreg_ros.segmenter.gravity.imu import Imu
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
@@ -140,22 +142,22 @@ class SegmenterNode(SynchronisedNode):
     def _on_camera(self, message: Any) -> None:
         self._camera_info = message
         self.watch.forget("camera_info")  # once is enough
-        self.feed("camera_info", from_msg.stamp_ns(message), message)
+        self.feed("camera_info", headers.stamp_ns(message), message)
 
     def _receive_colour_camera(self, message: Any) -> None:
         self._colour_info = message
 
     def _on_image(self, _: str, message: Any) -> None:
         surplus = isinstance(message, Surplus)
-        self.feed("image", from_msg.stamp_ns(message), Drop.SURPLUS if surplus else message)
+        self.feed("image", headers.stamp_ns(message), Drop.SURPLUS if surplus else message)
 
     def _on_odom(self, message: Any) -> None:
-        odometry = self.read_aside("odom", from_msg.odometry, message)
+        odometry = self.read_aside("odom", motion_from_msg.odometry, message)
         if odometry is not None:
             self.feed("odom", odometry.stamp_ns, odometry)
 
     def _on_imu(self, message: Any) -> None:
-        sample = self.read_aside("imu", from_msg.imu, message)
+        sample = self.read_aside("imu", motion_from_msg.imu, message)
         felt = None if sample is None else self._imu.receive(sample)
         if felt is not None:
             self.feed("imu", felt.stamp_ns, felt)
@@ -167,7 +169,7 @@ class SegmenterNode(SynchronisedNode):
         return from_msg.depth(message, self.most_pixels) if topic in DEPTH else from_msg.point_cloud(message)
 
     def _on_depth(self, topic: str, message: Any) -> None:
-        stamp_ns = from_msg.stamp_ns(message)
+        stamp_ns = headers.stamp_ns(message)
         if self.taken("depth") != topic:
             self._turn_away(stamp_ns, topic, message)
             return
@@ -225,7 +227,7 @@ class SegmenterNode(SynchronisedNode):
     def _level_gravity(self, match: Match, camera_frame: str) -> Array | None:
         odom = match.payloads.get("odom")
         T_body_camera = self._mount.T_body_camera(odom, camera_frame)
-        gravity = from_msg.level_gravity(match.stamp_ns, odom, T_body_camera)
+        gravity = motion_from_msg.level_gravity(match.stamp_ns, odom, T_body_camera)
         if gravity is None and self._inputs.level_odom:
             self.throttled.remind(
                 "level_odom", "expected odometry around a frame, as level_odom is on, got none: gravity is estimated; "
@@ -237,7 +239,7 @@ class SegmenterNode(SynchronisedNode):
         samples = match.payloads.get("imu")
         if not samples:
             return None
-        felt = self._imu.in_camera(from_msg.gravity_at(match.stamp_ns, samples), camera_frame)
+        felt = self._imu.in_camera(motion_from_msg.gravity_at(match.stamp_ns, samples), camera_frame)
         if felt is None:
             self.throttled.remind(
                 "imu_frame", f"expected to know how the IMU is mounted, got it in {samples[0].frame_id!r} and depth in "
@@ -292,7 +294,7 @@ class SegmenterNode(SynchronisedNode):
         awaited = not self._inputs.camera and self._colour_info is None and self.count_publishers(COLOUR_INFO) > 0
         return colour_frame.Cameras(camera_info, self._colour_info, named, awaited)
 
-    def _tell_lens(self, seen: colour_frame.Seen) -> None:
+    def _log_lens(self, seen: colour_frame.Seen) -> None:
         """Say once, and again where it changes, what is assumed of the lens and how depth is registered."""
         lens = self.read("camera_info", lenses.describe, seen.camera_info, seen.raw)
         if lens != self._lens:
@@ -304,16 +306,16 @@ class SegmenterNode(SynchronisedNode):
 
     def _depth(self, match: Match, camera_info: Any, raw: lenses.Raw) -> tuple[colour_frame.Seen, PointCloud | None]:
         """The depth image in the picture of colour, and the cloud where it comes of one."""
-        picture_frame = from_msg.frame_id(match["detections"])
+        picture_frame = headers.frame_id(match["detections"])
         if "camera_info" in match.payloads:
             messages = match["depth"], self._cameras(camera_info), match["image"]
             settings = self._find_pose, raw, self.most_pixels, picture_frame
             seen = self.read("depth", colour_frame.depth_image, *messages, *settings)
-            self._tell_lens(seen)
+            self._log_lens(seen)
             return seen, None
         cloud = self.read("points", from_msg.point_cloud, match["depth"])
         cloud = colour_frame.in_optical_frame(cloud, picture_frame, self._find_pose)
-        camera = self.read("camera_info", from_msg.camera_of_cloud, camera_info, cloud, self.most_pixels)
+        camera = self.read("camera_info", camera_from_msg.camera_of_cloud, camera_info, cloud, self.most_pixels)
         with self.accounting.timed("organise"):
             return colour_frame.Seen(organise(cloud, camera), camera_info, raw), cloud
 

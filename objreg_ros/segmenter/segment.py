@@ -10,15 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros import limits
-from objreg_ros.data import UNNAMED, Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
+from objreg_ros import extra, limits
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import UNNAMED, Frame, ObjectCloud, PointFlag
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice, choose_gravity
 from objreg_ros.segmenter.gravity.level_surfaces import camera_up, estimate_up, known_normals
 from objreg_ros.segmenter.objects import boxes, paper
 from objreg_ros.segmenter.objects.boxes import NOTHING, Box
 from objreg_ros.segmenter.objects.extract import Pixels, cell_points, colours
 from objreg_ros.segmenter.objects.isolate import Isolated, Outline, cut_out, isolate, mark
-from objreg_ros.segmenter.objects.unnamed import PERSON, find_things
+from objreg_ros.segmenter.objects.unnamed import PERSON, find_unnamed
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.sensor.depth_to_colour import warm as warm_offset
 from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
@@ -43,6 +45,8 @@ class Segmenter:
 
     def __init__(self, params: SegmenterParams | None = None) -> None:
         self.params = params or SegmenterParams()
+        if self.params.preset == "paper":
+            extra.load("open3d", "paper", "preset: paper")
         self.choice = GravityChoice(None, 0.0, "nothing")
         self._beside = ThreadPoolExecutor(1, "segmenter")
         self.sensor = SensorEstimate()
@@ -103,8 +107,8 @@ class Segmenter:
         taken = np.zeros(ground.surface.depth.shape, np.bool_)
         asked = boxes.pixel_boxes(detections, *depth.depth.shape)
         people = [box for box, label in zip(asked, detections.label, strict=True) if label == PERSON]
-        things = [NOTHING if label == PERSON else box for box, label in zip(asked, detections.label, strict=True)]
-        found = self._cut_all(depth, things, outlines, ground)
+        placed = [NOTHING if label == PERSON else box for box, label in zip(asked, detections.label, strict=True)]
+        found = self._cut_all(depth, placed, outlines, ground)
         objects: list[ObjectCloud] = []
         for k in sorted(found):
             cut = found[k]
@@ -114,7 +118,7 @@ class Segmenter:
                 label, score = detections.label[k], float(detections.score[k])
                 name = detections.ids[k] if detections.ids else ""
                 objects.append(_object(label, score, len(objects) + 1, cut.pixels, cut.flags, name))
-        objects += self._things(depth, ground, taken, people, len(objects))
+        objects += self._unnamed(depth, ground, taken, people, len(objects))
         return Frame(
             objects=tuple(objects),
             support=_support_cloud(ground, taken, depth),
@@ -126,13 +130,13 @@ class Segmenter:
             frame_id=depth.frame_id,
         )
 
-    def _things(
+    def _unnamed(
         self, depth: DepthImage, ground: Ground, taken: Array, people: list[Box], named: int
     ) -> list[ObjectCloud]:
         """The objects without a name, counted from behind the ``named`` ones."""
         if not self.params.unnamed or self.params.preset == "paper":
             return []
-        found = find_things(depth, ground, taken, people, self.params)[: limits.MOST_OBJECTS - named]
+        found = find_unnamed(depth, ground, taken, people, self.params)[: limits.MOST_OBJECTS - named]
         return [_object(UNNAMED, one.own, named + k, one.pixels, one.flags) for k, one in enumerate(found, start=1)]
 
     def _cut_all(

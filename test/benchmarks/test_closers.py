@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
-from objreg_ros.truth import Truth
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.truth import Truth
 
 
 def test_the_error_of_a_trajectory_is_that_of_every_frame_at_rest_or_not() -> None:

@@ -50,10 +50,10 @@ def test_without_recordings_the_mappers_commands_say_what_they_need(benchmark: B
     assert "expected RECORDINGS or --simulate SCENARIO:SEED, got neither" in said
 
 
-@pytest.mark.parametrize("story", ["foo:0", "loop:x", "loop:1,", "loop:-1"])
-def test_what_is_no_scenario_and_seed_is_refused(benchmark: Benchmark, tmp_path: Path, story: str) -> None:
-    said = refusal(benchmark("closure").main, "--simulate", story, "--keep", str(tmp_path))
-    assert "expected SCENARIO:SEED" in said and f"got '{story}'" in said
+@pytest.mark.parametrize("plan", ["foo:0", "loop:x", "loop:1,", "loop:-1"])
+def test_what_is_no_scenario_and_seed_is_refused(benchmark: Benchmark, tmp_path: Path, plan: str) -> None:
+    said = refusal(benchmark("closure").main, "--simulate", plan, "--keep", str(tmp_path))
+    assert "expected SCENARIO:SEED" in said and f"got '{plan}'" in said
 
 
 @pytest.mark.parametrize("jitter", ["3", "3,x", "-1,4", "3,4,5", "3,101", "nan,1"])
@@ -97,7 +97,7 @@ def test_a_run_that_has_no_time_for_a_picture_says_so(detector: ModuleType, monk
 
 
 def test_a_scenario_without_seeds_is_that_of_seed_0(benchmark: Benchmark) -> None:
-    assert benchmark("closure").stories(["loop", "moved:1,2"]) == [("loop", 0), ("moved", 1), ("moved", 2)]
+    assert benchmark("closure").plans(["loop", "moved:1,2"]) == [("loop", 0), ("moved", 1), ("moved", 2)]
 
 
 def test_recordings_of_one_name_are_refused(benchmark: Benchmark, tmp_path: Path) -> None:

@@ -7,9 +7,9 @@ import click
 import numpy as np
 import pytest
 
-from objreg_ros.data import LoopClosure, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.geometry import pose
-from objreg_ros.truth import Truth
+from objreg_tools.truth import Truth
 
 WRONG = (
     *("loop", "loop:x", "foo:1", "loop:1:eye", "loop:1:qvga:much", "loop:1:qvga:stress:"),
@@ -34,7 +34,7 @@ def refused(metres: float | None, reason: Reason) -> Rejected:
 
 
 @pytest.mark.parametrize(
-    ("text", "story"),
+    ("text", "plan"),
     [
         ("loop:7", ("loop", 7, "kinect", False)),
         ("loop:7:stress", ("loop", 7, "kinect", True)),
@@ -42,18 +42,18 @@ def refused(metres: float | None, reason: Reason) -> Rejected:
         ("moved:103:azure_kinect:stress", ("moved", 103, "azure_kinect", True)),
     ],
 )
-def test_a_recording_is_named_by_scenario_seed_camera_and_stress(text: str, story: tuple) -> None:
+def test_a_recording_is_named_by_scenario_seed_camera_and_stress(text: str, plan: tuple) -> None:
     from false_closures import told
 
-    assert told(text) == (*story, "kinect_v1", ())
+    assert told(text) == (*plan, "kinect_v1", ())
 
 
 def test_a_recording_may_name_its_sensor_and_what_is_wrong_with_it() -> None:
     from false_closures import told
 
-    story = told("loop:7:sensor=realsense_d435:lens=0.1,0,0,0:lag_ms=25:stress")
-    assert story == ("loop", 7, "realsense_d435", True, "realsense_d435", ("rig.lag_ms=25", "rig.distortion=0.1,0,0,0"))
-    assert story.name == "loop 7, realsense_d435, realsense_d435 depth, lag_ms=25, distortion=0.1,0,0,0, stress"
+    plan = told("loop:7:sensor=realsense_d435:lens=0.1,0,0,0:lag_ms=25:stress")
+    assert plan == ("loop", 7, "realsense_d435", True, "realsense_d435", ("rig.lag_ms=25", "rig.distortion=0.1,0,0,0"))
+    assert plan.name == "loop 7, realsense_d435, realsense_d435 depth, lag_ms=25, distortion=0.1,0,0,0, stress"
     assert told("loop:7:qvga:sensor=azure_kinect")[2:5] == ("qvga", False, "azure_kinect")
 
 

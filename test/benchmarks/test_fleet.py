@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics, LoopClosure, View
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose
-from objreg_ros.report.run.revisits import Seen
-from objreg_ros.truth import Truth, Truths
+from objreg_tools.report.run.revisits import Seen
+from objreg_tools.truth import Truth, Truths
 
 SECOND = 10**9
 CAMERA = Intrinsics(fx=40.0, fy=40.0, cx=19.5, cy=14.5, width=40, height=30)

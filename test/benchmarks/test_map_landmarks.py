@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from registration.samples import SECOND, box, frame, keyframe
 
-from objreg_ros.data import Array, LoopClosure, Odometry
+from objreg_mapper.params import MapperParams
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.memory.sighting import sightings_of
-from objreg_ros.truth import Truth
+from objreg_tools.truth import Truth
 
 XS = [*range(6), *range(4, -1, -1)]  # m along x, a second each: there and back
 STAMPS = [k * SECOND for k in range(len(XS))]

@@ -11,9 +11,9 @@ import click
 import numpy as np
 import pytest
 
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose
-from objreg_ros.truth import Truth
+from objreg_tools.truth import Truth
 
 SECOND = 10**9
 

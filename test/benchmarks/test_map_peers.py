@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.simulation.walk import Walk, WalkParams, walk
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_tools.simulation.walk import Walk, WalkParams, walk
 
 
 @pytest.fixture(autouse=True)

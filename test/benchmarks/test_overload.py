@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-from objreg_ros.recording.messages import header_stamp_ns
+from objreg_tools.recording.rosbag.messages import header_stamp_ns
 
 SECOND = 1_000_000_000
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from registration.samples import box, frame, moved
 
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.truth import Truth
+from objreg_tools.truth import Truth
 
 CUP = box("cup", (0.0, 0.0, 1.0))
 DRIFT = pose(rotation_from_vector(np.array([0.0, 0.0, 0.3])), np.array([5.0, 1.0, 0.0]))

@@ -10,10 +10,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, LoopClosure
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose
 from objreg_ros.registrar.warm import drawn
-from objreg_ros.truth import Truth, Truths
+from objreg_tools.truth import Truth, Truths
 
 SECOND = 10**9
 

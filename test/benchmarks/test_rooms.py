@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from registration.samples import box, keyframe
 
 from objreg_ros.memory.sighting import Sighting, sightings_of
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 
 CUP, CHAIR = box("cup", (0.0, 0.0, 1.0)), box("chair", (0.0, 0.0, 1.5), 0.6)
 PARAMS = RegistrarParams(candidates=1)

@@ -35,7 +35,7 @@ def test_of_every_so_many_moments_one_is_left_with_all_that_belongs_to_it(every:
 def test_a_recording_without_pictures_has_no_stills() -> None:
     from stills import stills
 
-    from objreg_ros.recording.inputs import Inputs
+    from objreg_tools.recording.inputs import Inputs
 
     recording = SimpleNamespace(records=lambda topics: iter(()))
     with pytest.raises(ValueError, match="expected a recording with pictures"):
@@ -56,7 +56,7 @@ def test_stills_of_a_kitchen_close_no_less_where_depth_is_brought_upon_colour(sh
 
     from objreg_ros.keyframes.frame_window import FrameWindow
     from objreg_ros.keyframes.fusion import fuse
-    from objreg_ros.registration.params import RegistrarParams
+    from objreg_ros.registrar.params import RegistrarParams
 
     params, accepted = RegistrarParams(), {}
     detector = detector_of(str(shared / "models/ssd_mobilenet_v1_coco_int8.onnx"), 0.4)

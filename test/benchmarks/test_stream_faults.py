@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import Intrinsics
+from objreg_ros.bridge.messages import from_msg, headers
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotation_angle, rotation_from_vector
-from objreg_ros.recording import messages
-from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.recording.mounts import frame_tree
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.recording.mounts import frame_tree
+from objreg_tools.recording.rosbag import messages
 
 CAMERA = Intrinsics(fx=30.0, fy=31.0, cx=16.0, cy=12.0, width=32, height=24)
 STEP_NS, COUNT = 100_000_000, 12
@@ -196,7 +196,7 @@ def test_another_camera_shows_other_parts_mirrored_at_the_same_times_under_eithe
         inputs = choose_inputs(recording.topics)
         seen.add(str(inputs.image))
         colour = recording.messages(str(inputs.image))
-        assert [from_msg.stamp_ns(m) for m in colour] == [from_msg.stamp_ns(m) for m in recording.messages(DEPTH)]
+        assert [headers.stamp_ns(m) for m in colour] == [headers.stamp_ns(m) for m in recording.messages(DEPTH)]
         numbers = [int(from_msg.image(m).rgb[0, -1, 0]) - 200 for m in colour]
         assert numbers == [(7 * k + 6) % COUNT for k in range(COUNT)]
     assert seen == {COLOUR, FRONT_COLOUR}
@@ -209,7 +209,7 @@ def test_one_stream_of_pictures_is_stamped_30_to_300_ms_off() -> None:
     for seed in SEEDS:
         fault = made("late_pictures", seed)
         (topic,) = changed(fault.recording)
-        off = [from_msg.stamp_ns(m) - k * STEP_NS for k, m in enumerate(fault.recording.messages(topic))]
+        off = [headers.stamp_ns(m) - k * STEP_NS for k, m in enumerate(fault.recording.messages(topic))]
         assert topic in (COLOUR, DEPTH) and set(off) == {round(fault.magnitude["ms"] * 1e6)}
         assert 30e6 <= abs(off[0]) <= 300e6
 
@@ -223,7 +223,7 @@ def test_odometry_of_another_robot_keeps_its_stamps_and_leads_elsewhere() -> Non
         fault = made("other_robot", seed)
         poses = odometry_poses(fault.recording)
         seen.add(fault.magnitude["how"])
-        stamps = [from_msg.stamp_ns(m) for m in fault.recording.messages(ODOM)]
+        stamps = [headers.stamp_ns(m) for m in fault.recording.messages(ODOM)]
         assert stamps == [k * STEP_NS for k in range(COUNT)] and changed(fault.recording) == {ODOM}
         if fault.magnitude["how"] == "other":
             assert np.allclose(poses[-1] @ T_BODY_CAMERA, pose(np.eye(3), np.array([0.0, 4.0, 0.0])))
@@ -237,7 +237,7 @@ def test_another_clock_moves_all_stamps_of_odometry_alike() -> None:
 
     for seed in SEEDS:
         recording = made("odometry_clock", seed).recording
-        off = {from_msg.stamp_ns(m) - k * STEP_NS for k, m in enumerate(recording.messages(ODOM))}
+        off = {headers.stamp_ns(m) - k * STEP_NS for k, m in enumerate(recording.messages(ODOM))}
         assert len(off) == 1 and 0.3e9 <= abs(off.pop()) <= 50e9
 
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from objreg_ros.data import ColourImage, Detections
+from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.truth import Truth
+from objreg_tools.truth import Truth
 
 GENERATOR = '''"""Bags that are odd. CASE chooses:
 

@@ -10,7 +10,7 @@ from types import ModuleType, SimpleNamespace
 import pytest
 from click.testing import CliRunner
 
-from objreg_ros.bridge.node.profile import MODE, VARIABLES
+from objreg_ros.bridge.process.profile import MODE, VARIABLES
 
 REST = {"delay_ms": 20.0, "mbit": 6.0, "messages": 3, "size": 80_000, "peers": False, "linger_s": 1.5, "seed": 0}
 

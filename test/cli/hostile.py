@@ -13,18 +13,18 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from recording.folders import records, tum_folder
+from recording.sample_folders import records, tum_folder
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from objreg_ros.recording import write_rosbag2
-from objreg_ros.recording.messages import standard_types
+from objreg_tools.recording import write_rosbag2
+from objreg_tools.recording.rosbag.messages import standard_types
 
 DEEP = 100_000
 PATIENCE_S = 240
 
 CALLS = """
 import contextlib, io, json, signal, sys, traceback
-from objreg_ros.cli import main
+from objreg_tools.cli import main
 
 def late(*_):
     raise BaseException("it takes more than a minute")

@@ -6,12 +6,12 @@ import os
 from pathlib import Path
 
 import pytest
-from recording.folders import tum_folder
+from recording.sample_folders import tum_folder
 
-from objreg_ros.cli import batch_work
-from objreg_ros.cli.batch_work import BatchWork
-from objreg_ros.cli.recorded import Asked
-from objreg_ros.cli.settings import read_settings
+from objreg_tools.cli import batch_work
+from objreg_tools.cli.batch_work import BatchWork
+from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.settings import read_settings
 
 RESULT = {
     **dict.fromkeys(("frames", "detections", "objects"), 0),

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.cli import checks
-from objreg_ros.cli.checks import Check
+from objreg_tools.cli import checks
+from objreg_tools.cli.checks import Check
 
 
 def only(found: list[Check]) -> Check:

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.cli import download as module
-from objreg_ros.cli.download import download
-from objreg_ros.cli.fetch_model import Source, fetch
+from objreg_tools.cli import download as module
+from objreg_tools.cli.commands.fetch_model import Source, fetch
+from objreg_tools.cli.download import download
 
 Answering = Callable[[socket.socket], None]
 OK = b"HTTP/1.1 200 OK\r\nContent-Type: application/octet-stream\r\n"

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.bridge.node.accounting import Balance
-from objreg_ros.cli.live import STAGES, Live, Setup, private_environment, run_live
-from objreg_ros.data import LoopClosure, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_tools.cli.live import STAGES, Live, Setup, private_environment, run_live
 
 BAG = Path("some/bag")
 CLOSURE = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=())
@@ -115,7 +115,7 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Stage:
     """A stage on which all nodes report after a second, and whose player ends at once."""
     made = Stage()
     made.events = [(1.0, made.reports(**dict.fromkeys(STAGES, counters(0)))), (1.0, made.ends)]
-    monkeypatch.setattr("objreg_ros.cli.live.Processes", made.processes)
+    monkeypatch.setattr("objreg_tools.cli.live.Processes", made.processes)
     monkeypatch.setattr("rclpy.context.Context", lambda: made)
     monkeypatch.setattr("objreg_ros.bridge.streams.collector.Collector", lambda context: made)
     monkeypatch.setattr("os.environ", {"HOME": "/home/me"})
@@ -128,7 +128,7 @@ def test_the_nodes_get_their_arguments_and_the_player_the_recording(stage: Stage
         "detector": ("objreg_ros.detector.node", ["--ros-args", "-p", "model:=a"], True),
         "segmenter": ("objreg_ros.segmenter.node", [], True),
         "registrar": ("objreg_ros.registrar.node", [], True),
-        "player": ("objreg_ros.cli", ["replay", "some/bag", "--rate", "2"], False),
+        "player": ("objreg_tools.cli", ["replay", "some/bag", "--rate", "2"], False),
     }
     assert [line.split()[0] for line in stage.said] == ["starting", "playing", "waiting"]
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from objreg_ros.bridge.node.accounting import Balance
-from objreg_ros.cli.live import Live
-from objreg_ros.cli.live_table import lines, require_balance
-from objreg_ros.data import LoopClosure
-from objreg_ros.truth import summarise
+from objreg_ros.data.closures import LoopClosure
+from objreg_tools.cli.live import Live
+from objreg_tools.cli.live_table import lines, require_balance
+from objreg_tools.truth import summarise
 
 CLOSURE = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=())
 SENT = {"detector": 10, "segmenter": 10, "registrar": 6}

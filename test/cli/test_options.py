@@ -10,8 +10,8 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-from objreg_ros.cli import options
-from objreg_ros.cli.settings import read_settings
+from objreg_tools.cli import options
+from objreg_tools.cli.settings import read_settings
 
 
 def parsed(*words: str) -> tuple[Result, dict[str, Any]]:

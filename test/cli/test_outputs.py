@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from objreg_ros.cli.outputs import Outputs
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_tools.cli.outputs import Outputs
 
 
 def asked(folder: Path, *options: str, voxel: float = 0.02) -> Outputs:
@@ -53,6 +53,6 @@ def test_a_cloud_is_made_of_a_store_in_a_file(tmp_path: Path) -> None:
 
 
 def test_nothing_is_written_of_a_run_without_frames(tmp_path: Path) -> None:
-    story: Any = SimpleNamespace(glimpses=())
-    asked(tmp_path, "tum", "mcap").write(story, None, Path("store"))  # type: ignore[arg-type]
+    run_summary: Any = SimpleNamespace(glimpses=())
+    asked(tmp_path, "tum", "mcap").write(run_summary, None, Path("store"))  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())

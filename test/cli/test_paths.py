@@ -11,11 +11,11 @@ from typing import Any
 import click
 import pytest
 from click.testing import CliRunner
-from recording.folders import tum_folder
+from recording.sample_folders import tum_folder
 
 from objreg_ros import share
-from objreg_ros.cli import group, paths
-from objreg_ros.cli.paths import INPUTS, OutputPath, require_apart, require_writable
+from objreg_tools.cli import group, paths
+from objreg_tools.cli.paths import INPUTS, OutputPath, require_apart, require_writable
 
 CONTENT = b"what must stay"
 NAMES_NO_FILE = {
@@ -59,38 +59,38 @@ def kept(tmp_path: Path) -> Path:
     return file
 
 
-@pytest.mark.parametrize("name", commands())
-def test_every_path_of_a_command_is_known_as_read_or_written_and_watched(name: str) -> None:
-    command = commands()[name]
-    for parameter in command.params:
-        if isinstance(parameter.type, click.Path | click.File):
-            assert isinstance(parameter.type, (*INPUTS, OutputPath)), parameter.name
-        elif parameter.type is click.STRING:
-            assert parameter.name in NAMES_NO_FILE, f"{parameter.name}: give it a type of cli/paths.py"
-    assert hasattr(command.callback, "is_guarded")
+def test_every_path_of_a_command_is_known_as_read_or_written_and_watched() -> None:
+    for name in commands():
+        command = commands()[name]
+        for parameter in command.params:
+            if isinstance(parameter.type, click.Path | click.File):
+                assert isinstance(parameter.type, (*INPUTS, OutputPath)), parameter.name
+            elif parameter.type is click.STRING:
+                assert parameter.name in NAMES_NO_FILE, f"{parameter.name}: give it a type of cli/paths.py"
+        assert hasattr(command.callback, "is_guarded"), name
 
 
-@pytest.mark.parametrize(("name", "output"), list(outputs()))
-def test_no_output_of_any_command_takes_the_place_of_any_of_its_inputs(name: str, output: str, kept: Path) -> None:
-    command = commands()[name]
-    inputs = [p for p in command.params if isinstance(p.type, INPUTS)]
-    assert inputs or name in ("simulate", "fetch-model")
-    for parameter in inputs:
-        read: Any = kept if isinstance(parameter.type, click.Path) else f"detector.model={kept}"
-        several = parameter.multiple or parameter.nargs == -1
-        if isinstance(parameter.type, paths.SettingsPath):
-            kept.write_text("{}")
-        given = {parameter.name or "": (read,) if several else read, output: kept}
-        with pytest.raises(ValueError, match=r"expected a place apart from all that is read, got .*kept, of "):
-            require_apart(command, given)
+def test_no_output_of_any_command_takes_the_place_of_any_of_its_inputs(kept: Path) -> None:
+    for name, output in list(outputs()):
+        command = commands()[name]
+        inputs = [p for p in command.params if isinstance(p.type, INPUTS)]
+        assert inputs or name in ("simulate", "fetch-model"), name
+        for parameter in inputs:
+            read: Any = kept if isinstance(parameter.type, click.Path) else f"detector.model={kept}"
+            several = parameter.multiple or parameter.nargs == -1
+            if isinstance(parameter.type, paths.SettingsPath):
+                kept.write_text("{}")
+            given = {parameter.name or "": (read,) if several else read, output: kept}
+            with pytest.raises(ValueError, match=r"expected a place apart from all that is read, got .*kept, of "):
+                require_apart(command, given)
 
 
-@pytest.mark.parametrize(("name", "output"), list(outputs()))
-def test_no_two_outputs_of_any_command_are_one_file(name: str, output: str, tmp_path: Path) -> None:
-    others = [other for command, other in outputs() if command == name and other != output]
-    for other in others:
-        with pytest.raises(ValueError, match=r"expected a file of its own, got that of --"):
-            require_apart(commands()[name], {output: tmp_path / "one", other: tmp_path / "x" / ".." / "one"})
+def test_no_two_outputs_of_any_command_are_one_file(tmp_path: Path) -> None:
+    for name, output in list(outputs()):
+        others = [other for command, other in outputs() if command == name and other != output]
+        for other in others:
+            with pytest.raises(ValueError, match=r"expected a file of its own, got that of --"):
+                require_apart(commands()[name], {output: tmp_path / "one", other: tmp_path / "x" / ".." / "one"})
 
 
 def disguised(kept: Path, folder: Path) -> Iterator[Path]:

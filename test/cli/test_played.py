@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from recording.folders import noetic_bag, tum_folder
+from recording.sample_folders import noetic_bag, tum_folder
 
-from objreg_ros.cli.played import as_rosbag2
-from objreg_ros.recording import open_recording
-from objreg_ros.recording.inputs import Inputs
+from objreg_tools.cli.played import as_rosbag2
+from objreg_tools.recording import open_recording
+from objreg_tools.recording.inputs import Inputs
 
 INPUTS = Inputs(image="/image", depth="/depth/image", camera_info="/camera_info")
 

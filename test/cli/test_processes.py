@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.cli.processes import Processes
+from objreg_tools.cli.processes import Processes
 
 SLEEPER = "import time\nprint('ready', flush=True)\ntime.sleep(60)\n"
 FAILURE = "import sys\nprint('so far so good')\nsys.exit('this went wrong')\n"

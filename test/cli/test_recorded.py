@@ -5,13 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from recording.folders import tum_folder
+from recording.sample_folders import tum_folder
 from recording.vision import detected_bag
 
-from objreg_ros.cli.recorded import Asked
-from objreg_ros.cli.settings import read_settings
-from objreg_ros.recording import Record, open_recording, write_rosbag2
-from objreg_ros.recording.drift import with_drifting_odometry
+from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.settings import read_settings
+from objreg_tools.recording import Record, open_recording, write_rosbag2
+from objreg_tools.recording.drift import with_drifting_odometry
 
 NOTHING = {"model": None, "labels": None, "camera": "", "params_file": None, "changes": (), "remaps": ()}
 

@@ -8,17 +8,17 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from objreg_ros.cli import NOTHING
-from objreg_ros.cli.run_output import closing_lines, exit_code, json_to, print_next, print_reasons, tell
-from objreg_ros.cli.verbosity import received_by
-from objreg_ros.data import Reason, Rejected
+from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.plausibility.finding import Finding
+from objreg_tools.cli import NOTHING
+from objreg_tools.cli.run_output import closing_lines, exit_code, json_to, notify, print_next, print_reasons
+from objreg_tools.cli.verbosity import received_by
 
 FINDING = Finding("nothing is seen", "it is dark", "put on the light", "no-detections")
 
 
 def test_a_finding_is_a_block_and_a_remark_a_line(capsys: pytest.CaptureFixture[str]) -> None:
-    tell([FINDING, Finding("no odometry")])
+    notify([FINDING, Finding("no odometry")])
     assert capsys.readouterr().out.splitlines() == [
         "! nothing is seen", "    likely: it is dark", "    next: put on the light",
         "    more: docs/troubleshooting.md#no-detections", "! no odometry",

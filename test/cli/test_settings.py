@@ -5,10 +5,18 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.cli.settings import NODES, Settings, names_of, parse_change, read_settings, ros_argument, tell_ignored
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
+from objreg_tools.cli.settings import (
+    NODES,
+    Settings,
+    names_of,
+    parse_change,
+    print_ignored,
+    read_settings,
+    ros_argument,
+)
 
 
 def test_without_anything_the_defaults_hold() -> None:
@@ -56,8 +64,8 @@ def test_a_section_that_is_for_no_node_of_ours_is_named(tmp_path: Path, capsys: 
     (tmp_path / "p.yaml").write_text("/**/registar:\n  ros__parameters: {seed: 5}\ncamera:\n  ros__parameters: {}\n")
     settings = read_settings(tmp_path / "p.yaml", ())
     assert settings.ignored == ("/**/registar", "camera")
-    tell_ignored(settings)
-    tell_ignored(read_settings(None, ()))
+    print_ignored(settings)
+    print_ignored(read_settings(None, ()))
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("! ignored of the parameter file: /**/registar, camera; the nodes are detector, segmenter")
 

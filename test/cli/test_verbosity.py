@@ -10,7 +10,7 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-from objreg_ros.cli.verbosity import aside, is_quiet, is_verbose, received_by
+from objreg_tools.cli.verbosity import aside, is_quiet, is_verbose, received_by
 
 
 def said(*words: str) -> Result:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from objreg_ros.data import Intrinsics, ObjectCloud
+from objreg_ros.data.frames import ObjectCloud
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.detector.picture import Place
 
 from .tiny_model import save_constant_model

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.data import ColourImage
+from objreg_ros.data.images import ColourImage
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.detector.picture import USUAL_HW

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.data import ColourImage
+from objreg_ros.data.images import ColourImage
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.grid import cells, grid, strides_of
 from objreg_ros.detector.params import DetectorParams

@@ -11,8 +11,9 @@ import pytest
 
 from docs.draw_reasons import PAGE, PICTURES, SCHEMES, SYMPTOM, common, details, section, side_by_side, with_reference
 from docs.schemes import DROPS as DROP_SCHEMES
-from objreg_ros.data import DepthImage, Intrinsics, Reason
-from objreg_ros.report.run.reasons import DROPS, REFUSALS, ReasonText
+from objreg_ros.data.closures import Reason
+from objreg_ros.data.images import DepthImage, Intrinsics
+from objreg_tools.report.run.reasons import DROPS, REFUSALS, ReasonText
 
 MOST_BYTES, MOST_OF_ALL = 60_000, 1_000_000
 CAMERA = Intrinsics(fx=300.0, fy=300.0, cx=159.5, cy=119.5, width=320, height=240)
@@ -58,9 +59,12 @@ def test_a_pair_without_a_pose_or_without_a_picture_is_not_drawn() -> None:
 
 def test_a_section_names_what_stands_behind_a_reason() -> None:
     told = section(
-        "late", ReasonText("it came late", "Wait.", ("segmenter.slop",), (("data.py", "JUMP_NS"),)), "", "1 > 0"
+        "late", ReasonText("it came late", "Wait.", ("segmenter.slop",), (("data/frames.py", "JUMP_NS"),)), "", "1 > 0"
     )
-    assert "It came late. Wait. Behind it: [`segmenter.slop`](parameters.md#segmenter), `JUMP_NS` in `data.py`." in told
+    assert (
+        "It came late. Wait. Behind it: [`segmenter.slop`](parameters.md#segmenter), `JUMP_NS` in `data/frames.py`."
+        in told
+    )
     assert "![A pair refused as late](pictures/late.jpg)" in told and "*1 > 0*" in told
 
 

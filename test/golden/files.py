@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Detections
+from objreg_ros.data.images import Detections
 
 FOLDER = Path(__file__).resolve().parent
 ROWS = ("constraints", "refusals", "detections")

@@ -9,18 +9,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from objreg_ros.cli.simulate import camera_of, sensors_of
-from objreg_ros.data import ColourImage, Detections, Rejected
-from objreg_ros.offline import Detects, Run, Stages, run_offline
-from objreg_ros.recording import open_recording
-from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.data.closures import Rejected
+from objreg_ros.data.images import ColourImage, Detections
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.exports.export import constraint
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.organise import organise
-from objreg_ros.simulation.write import simulate
+from objreg_tools.cli.commands.simulate import camera_of, sensors_of
+from objreg_tools.offline.line import run_offline
+from objreg_tools.offline.run import Run
+from objreg_tools.offline.stages import Detects, Stages
+from objreg_tools.recording import open_recording
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.report.exports.export import constraint
+from objreg_tools.simulation.write import simulate
 
 FOLDER = Path(__file__).resolve().parent
 NO_MODEL_SAW_IT = "expected stored detections of the picture at {} ns, got none; record anew: python {}"

@@ -10,9 +10,9 @@ import numpy as np
 from objreg_ros.keyframes.fewer_points import LEAST_POINTS, NEAREST_M, in_front, thinned
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import FrameWindow
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.warm import drawn
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 
 
 def place() -> Keyframe:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from registration.samples import box, cloud, frame, moved, scene_view
 
-from objreg_ros.data import UNNAMED, Array, PointFlag
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import UNNAMED, PointFlag
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
 from objreg_ros.keyframes import fusion
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse, fuse_objects, motions_to, reference_index
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 
 PARAMS = RegistrarParams()
 GROUPS = PARAMS.label_groups

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.keyframes.jitter import LEAST_PAIRS, STEADY, Jitter, JitterMeter
 
 NONE = np.zeros((400, 2))

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from registration.samples import CAMERA, SECOND, box, frame, moved, scene_view
 
-from objreg_ros.data import Frame, View
+from objreg_ros.data.frames import Frame, View
 from objreg_ros.geometry import inverse, is_rigid, pose, rotation_from_vector
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 
 PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0)
 CUP = (box("cup", (0, 0, 1)),)

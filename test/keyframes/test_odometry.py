@@ -9,7 +9,7 @@ from registration.samples import moved
 
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.keyframes.odometry import TURNS_DEG_S, TravelledPath
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 
 PARAMS = RegistrarParams(
     odometry_translation_noise=0.03, odometry_drift=0.1, odometry_rotation_noise=1.0, odometry_rotation_drift=0.01

@@ -10,15 +10,16 @@ import pytest
 from registration.samples import box, cloud, frame, keyframe, scene_view
 
 from objreg_ros import limits
-from objreg_ros.data import Frame, Intrinsics, ObjectCloud, View
+from objreg_ros.data.frames import Frame, ObjectCloud, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project
 from objreg_ros.keyframes import own_size
 from objreg_ros.keyframes.own_size import sized_frame, sized_keyframe
 from objreg_ros.memory import retrieval
 from objreg_ros.memory.compact import pack_keyframe, unpack_keyframe
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.keyframe import Context, KeyObject
-from objreg_ros.registration.params import RegistrarParams
 
 
 def wall(width: int, height: int) -> View:

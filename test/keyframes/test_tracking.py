@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from registration.samples import CAMERA, moved, scene_view
 
-from objreg_ros.data import View
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import pose, pose_error, rotation_from_vector
 from objreg_ros.keyframes.tracking import same_picture, tracked_surface, view_motion
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from registration.samples import scene_view
 
-from objreg_ros.data import View
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import pose, rotation_angle, rotation_from_vector
 from objreg_ros.keyframes.turn import LastPicture, small_pictures, turn_between
 

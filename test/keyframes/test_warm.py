@@ -10,7 +10,7 @@ CODE = """
 from numba.core.dispatcher import Dispatcher
 import gc
 from objreg_ros.keyframes import keyframer, fusion, warm
-from objreg_ros.registration.params import KeyframeParams
+from objreg_ros.keyframes.params import KeyframeParams
 
 def compiled():
     kernels = (d for d in gc.get_objects() if isinstance(d, Dispatcher))

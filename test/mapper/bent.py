@@ -7,7 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from objreg_ros.data import Array, LoopClosure, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 
 SECOND = 1_000_000_000

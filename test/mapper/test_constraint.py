@@ -6,9 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, LoopClosure
-from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from_rotation
-from objreg_ros.mapper.constraint import (
+from objreg_mapper.constraint import (
     Constraint,
     between_keyframes,
     compensated,
@@ -19,7 +17,10 @@ from objreg_ros.mapper.constraint import (
     unseen,
     wandering,
 )
-from objreg_ros.mapper.trajectory import Trajectory
+from objreg_mapper.trajectory import Trajectory
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from_rotation
 
 RNG = np.random.default_rng(7)
 

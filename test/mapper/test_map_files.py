@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.mapper import saved
-from objreg_ros.mapper.adapters.g2o import graph_text
-from objreg_ros.mapper.map_files import graph_file, require_ours
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_mapper import saved
+from objreg_mapper.formats.g2o import graph_text
+from objreg_mapper.map_files import graph_file, require_ours
+from objreg_mapper.params import MapperParams
+from objreg_mapper.pose_graph import PoseGraph
 
 THREE_POSES = [np.eye(4), np.eye(4), np.eye(4)]
 

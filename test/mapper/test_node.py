@@ -20,14 +20,15 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_mapper.node import MapperNode
+from objreg_mapper.optimisation.problem import Solution
+from objreg_mapper.optimisation.solver import Solver
+from objreg_mapper.pose_graph import Problem
+from objreg_ros.bridge.messages import headers, motion_from_msg, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.log import ThrottledLog
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.mapper.node import MapperNode
-from objreg_ros.mapper.pose_graph import Problem
-from objreg_ros.mapper.solver import Solution, Solver
 
 from .bent import SECOND, bent, closure, odometry, square
 
@@ -93,7 +94,7 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Outside
 
 
 def end_of(path: Any) -> np.ndarray:
-    return from_msg.odometry(path.poses[-1]).T_odom_body
+    return motion_from_msg.odometry(path.poses[-1]).T_odom_body
 
 
 def test_the_path_ends_where_the_walk_began_once_constraints_are_in(outside: Outside) -> None:
@@ -119,7 +120,7 @@ def test_the_correction_carries_odom_to_map(outside: Outside) -> None:
     outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
 
     def end() -> np.ndarray:
-        return from_msg.odometry(outside.corrections[-1]).T_odom_body @ BENT[-1]
+        return motion_from_msg.odometry(outside.corrections[-1]).T_odom_body @ BENT[-1]
 
     outside.wait(lambda: np.linalg.norm(end()[:3, 3]) < 0.3 * np.linalg.norm(BENT[-1][:3, 3]))
     assert (outside.corrections[-1].header.frame_id, outside.corrections[-1].child_frame_id) == ("map", "odom")
@@ -167,7 +168,7 @@ def test_odometry_that_begins_anew_elsewhere_is_on_the_map_once_constraints_tie_
     outside.wait(lambda: outside.node.extra_diagnostics()["odometry"] == len(walk))
     told = outside.node.extra_diagnostics()
     assert (told["sessions"], told["placed in the map"]) == (2, False)
-    assert from_msg.stamp_ns(outside.corrections[-1]) < walk[HALF].stamp_ns  # where it is now nobody knows
+    assert headers.stamp_ns(outside.corrections[-1]) < walk[HALF].stamp_ns  # where it is now nobody knows
     outside.send(ROUND_TRIP)
     outside.wait(lambda: outside.node.extra_diagnostics()["placed in the map"] and outside.settled())
     outside.wait(lambda: outside.paths[-1].poses and np.linalg.norm(end_of(outside.paths[-1])[:3, 3]) < 0.5)
@@ -417,7 +418,7 @@ def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(
     for word in odometry(BENT[:3]):
         outside.node._on_odometry(to_msg.odometry(word))
         outside.node._on_odometry(to_msg.odometry(replace(word, stamp_ns=word.stamp_ns - 1000)))
-    assert [from_msg.stamp_ns(message) for message in broadcaster.sent] == [w.stamp_ns for w in odometry(BENT[:3])]
+    assert [headers.stamp_ns(message) for message in broadcaster.sent] == [w.stamp_ns for w in odometry(BENT[:3])]
     assert {(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent} == {("map", "odom")}
 
 

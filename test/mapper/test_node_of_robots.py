@@ -18,11 +18,11 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from nav_msgs.msg import Path as PathMsg
 from rclpy.executors import SingleThreadedExecutor
 
-from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_mapper.node import MapperNode
+from objreg_ros.bridge.messages import motion_from_msg, to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.mapper.node import MapperNode
 
 from .bent import SECOND, closure, odometry, square
 from .test_node import Broadcaster
@@ -111,7 +111,7 @@ def test_each_robot_has_its_path_and_correction_once_closures_tie_it_to_the_firs
     assert frames == {"a": ("map", "a/odom"), "b": ("map", "b/odom")}
 
     def end() -> np.ndarray:
-        return from_msg.odometry(fleet.corrections["b"][-1]).T_odom_body @ WALKS["b"][-1].T_odom_body
+        return motion_from_msg.odometry(fleet.corrections["b"][-1]).T_odom_body @ WALKS["b"][-1].T_odom_body
 
     fleet.wait(lambda: np.linalg.norm(end()[:3, 3] - LAPS["b"][-1][:3, 3]) < 0.05)
 

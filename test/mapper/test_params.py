@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.mapper.params import MapperNodeParams, MapperParams
-from objreg_ros.mapper.steady import Steady
+from objreg_mapper.optimisation.steady import Steady
+from objreg_mapper.params import MapperNodeParams, MapperParams
 
 
 def test_the_errors_of_odometry_are_in_metres_and_radians() -> None:

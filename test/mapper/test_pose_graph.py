@@ -9,17 +9,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, LoopClosure, Odometry
+from objreg_mapper.optimisation.chain import Chain
+from objreg_mapper.optimisation.edges import Edges
+from objreg_mapper.optimisation.incremental import IncrementalGraph
+from objreg_mapper.optimisation.problem import Solution, SolvedTrajectory
+from objreg_mapper.optimisation.steady import Steady
+from objreg_mapper.params import MapperParams
+from objreg_mapper.pose_graph import ImplausibleError, PoseGraph
+from objreg_mapper.sparse import TOLERANCE_DEG, TOLERANCE_M
+from objreg_mapper.trajectory import Trajectory
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import interpolate, inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.mapper.chain import Chain
-from objreg_ros.mapper.edges import Edges
-from objreg_ros.mapper.incremental import IncrementalGraph
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph
-from objreg_ros.mapper.solver import Course, Solution
-from objreg_ros.mapper.sparse import TOLERANCE_DEG, TOLERANCE_M
-from objreg_ros.mapper.steady import Steady
-from objreg_ros.mapper.trajectory import Trajectory
 
 from .bent import SECOND, bent, closure, distances, odometry, square
 
@@ -286,7 +288,7 @@ def test_between_keyframes_the_correction_goes_over_from_the_one_to_the_other() 
     aside = np.array([pose(np.eye(3), np.array([x, y, 0.0])) for x, y in ((0.0, 0.0), (1.0, 0.1), (2.0, 0.4))])
     chain = Chain(np.eye(4), Steady())
     chain.extend(np.array(graph.keyframes.poses), np.full((2, 2), 1e-4))
-    course = Course(chain, (0, 1, 2), aside)
+    course = SolvedTrajectory(chain, (0, 1, 2), aside)
     graph.adopt(graph.problem(), Solution((course,), np.zeros(0, bool), np.zeros(0)))
     found = [T[:2, 3] for T in graph.corrected(o.stamp_ns for o in odometry([np.eye(4)] * 9))]
     expected = [0.0, 0.025, 0.05, 0.075, 0.1, 0.175, 0.25, 0.325, 0.4]

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Odometry
+from objreg_mapper.restart import Admitted, Anew, Restart
+from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import pose
-from objreg_ros.mapper.restart import Admitted, Anew, Restart
 
 SECOND = 1_000_000_000
 

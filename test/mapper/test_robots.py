@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from objreg_ros.data import Array, LoopClosure
+from objreg_mapper import saved
+from objreg_mapper.params import MapperParams
+from objreg_mapper.pose_graph import PoseGraph, UnknownRobotError
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.mapper import saved
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph, UnknownRobotError
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
-from objreg_ros.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
 
 from .bent import SECOND, closure, distances, odometry, square
 

@@ -13,11 +13,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, LoopClosure, Odometry
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
-from objreg_ros.simulation.walk import Walk, WalkParams, walk
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.simulation.walk import Walk, WalkParams, walk
 
 from .bent import bent, closure, distances, odometry, square
 

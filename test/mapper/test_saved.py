@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.data import LoopClosure
+from objreg_mapper import saved
+from objreg_mapper.params import MapperParams
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.mapper import saved
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph
 
 from .bent import SECOND, bent, closure, distances, odometry, square
 

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, Odometry
+from objreg_mapper.constraint import wandering
+from objreg_mapper.params import MapperParams
+from objreg_mapper.session import Session, stacked
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.mapper.constraint import wandering
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.session import Session, stacked
 
 from .bent import SECOND, odometry, square
 
@@ -57,8 +58,8 @@ def test_a_step_is_the_motion_between_two_keyframes_and_as_sure_as_its_way_is_sh
 
 def test_a_way_is_as_long_one_way_as_the_other() -> None:
     session = told(straight(0.0, 0.5, 1.0, 1.5, 1.0, 0.5))
-    assert session.way_m(0, 5) == session.way_m(5, 0) == pytest.approx(2.5)
-    assert session.way_m(2, 3) == pytest.approx(0.5) and session.way_m(3, 3) == 0.0
+    assert session.path_m(0, 5) == session.path_m(5, 0) == pytest.approx(2.5)
+    assert session.path_m(2, 3) == pytest.approx(0.5) and session.path_m(3, 3) == 0.0
 
 
 def test_after_a_silence_the_next_keyframe_may_be_anywhere() -> None:
@@ -90,7 +91,7 @@ def test_time_that_runs_back_is_refused_and_changes_nothing() -> None:
 def test_a_turn_on_the_spot_is_a_keyframe_with_a_way_of_no_length() -> None:
     turns = [pose(rotation_from_vector(np.radians([0.0, 0.0, turn])), np.zeros(3)) for turn in (0.0, 14.0, 16.0)]
     session = told(turns)
-    assert len(session.keyframes) == 2 and session.way_m(0, 1) == 0.0 and min(session.variances[0]) > 0.0
+    assert len(session.keyframes) == 2 and session.path_m(0, 1) == 0.0 and min(session.variances[0]) > 0.0
 
 
 def test_no_poses_are_a_stack_of_none() -> None:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.sessions import Moment, Sessions, moments_of
+from objreg_mapper.params import MapperParams
+from objreg_mapper.sessions import Moment, Sessions, moments_of
 
 from .bent import SECOND, closure, odometry, square
 

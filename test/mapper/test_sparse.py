@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array
+from objreg_mapper.sparse import TOLERANCE_DEG, TOLERANCE_M, SparseTrajectory
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, pose_error, rotation_from_vector
-from objreg_ros.mapper.sparse import TOLERANCE_DEG, TOLERANCE_M, SparseTrajectory
 
 from .bent import SECOND
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from objreg_mapper.trajectory import Trajectory
 from objreg_ros.geometry import pose, rotation_angle, rotation_from_vector
-from objreg_ros.mapper.trajectory import Trajectory
 
 
 def along_x() -> Trajectory:

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, LoopClosure
+from objreg_mapper.follower import Follower, Followers
+from objreg_mapper.pose_graph import PoseGraph
+from objreg_mapper.waiting import Waiting
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose
-from objreg_ros.mapper.follower import Follower, Followers
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.mapper.waiting import Waiting
 
 from .bent import closure, odometry, square
 
@@ -64,7 +65,7 @@ def test_a_robot_that_nobody_follows_is_named() -> None:
     graph, waiting, _ = driven(("a", "b"))
     waiting.closures = [of(closure(TRUE, 10, 90), "a", "c")]
     (fate,) = waiting.tie(graph)
-    assert fate.reason == "unknown_robot" and "expected robots of a, b, got c" in fate.words
+    assert fate.reason == "unknown_robot" and "expected robots of a, b, got c" in fate.text
 
 
 def test_closures_wait_until_too_many_do() -> None:

@@ -23,9 +23,9 @@ from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.memory import compact
 from objreg_ros.memory.compact import pack_keyframe, unpack_keyframe
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.warm import drawn
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 
 Change = Callable[[dict[str, Any]], None]
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from registration.samples import box, keyframe, moved
 
-from objreg_ros.data import ObjectCloud
+from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.memory import landmarks as landmarks_module
 from objreg_ros.memory.landmarks import Landmarks, Link, Merge
 from objreg_ros.memory.sighting import Sighting, sightings_of
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 
 PARAMS = RegistrarParams(max_views=3)
 CUP, BOOK = box("cup", (0, 0, 1)), box("book", (0.5, 0, 1))

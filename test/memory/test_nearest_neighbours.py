@@ -12,7 +12,7 @@ from numpy.random import Generator
 from objreg_ros.memory.descriptor import EMPHASIS, SIZE
 from objreg_ros.memory.nearest_neighbours import LANES, Block, Sessions
 from objreg_ros.memory.sighting import Sighting
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 
 PARAMS = RegistrarParams(min_gap=2.0, odometry_radius=1.0, odometry_drift=0.1)
 MOST, MARGIN = 8, 8.0

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from registration.samples import box, keyframe, moved
 
-from objreg_ros.data import ObjectCloud
+from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.memory.retrieval import Index, _in_turn, _tally
 from objreg_ros.memory.sighting import Sighting, sightings_of
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 
 PARAMS = RegistrarParams(min_gap=2.0, candidates=3, thin_seconds=1.0)
 

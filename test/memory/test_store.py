@@ -21,15 +21,15 @@ import numpy as np
 import pytest
 from registration.samples import box, keyframe, moved
 
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.memory.codec import pack
 from objreg_ros.memory.counters import MOST_IDS
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registration.params import RegistrarParams
 
 WRITER = """
 import sys

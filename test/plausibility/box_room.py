@@ -8,7 +8,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, Intrinsics, Odometry, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Odometry, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project, inverse, pose, rotation_from_vector
 from plausibility.moving import CAMERA, MOUNT
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
 from objreg_ros.plausibility.corner_tracks import Span
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.plausibility.camera_fit import CORNER_SIGMA_PX
 from objreg_ros.plausibility.corner_tracks import LEAST_CORNERS, SPAN_S, SPAN_SHARE, CornerTracks, Span, depth_at
 from plausibility.box_room import seen_as, speckles

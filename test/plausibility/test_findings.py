@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import mounting
 from objreg_ros.plausibility import findings
 from objreg_ros.plausibility.camera_fit import CameraFit

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, pose_error, rotation_from_vector
 from objreg_ros.plausibility.hand_eye import best_rotation, hand_eye, scale_of, turns_of
 from plausibility.moving import MOUNT, carried, level_motions, random_motions

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverses, pose, rotation_from_vector
 from objreg_ros.plausibility.odometry_fit import LEAST_SHIFT_S, LEAST_TURNS, find_shift, likeness
 from objreg_ros.plausibility.odometry_track import OdometryTrack

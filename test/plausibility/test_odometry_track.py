@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Odometry
+from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.plausibility.odometry_track import APART_NS, MOST_GAP_S, MOST_SAMPLES, OdometryTrack
 

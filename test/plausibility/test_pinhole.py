@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from objreg_ros.data import Intrinsics
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.plausibility.pinhole import LEAST_FOCAL, MOST_ASPECT, MOST_FOCAL, SAME, differ, implausible, likelier
 
 KINECT = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)

@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import JUMP_NS, Array, Intrinsics, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import JUMP_NS, Odometry
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import pose, pose_error, rotation_from_vector
 from objreg_ros.plausibility.stream_monitor import LONG_S, PATIENCE_S, StreamMonitor
 from plausibility.box_room import RATE_HZ, depth_and_grey, longer, odometry, seen_as, swinging

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.recording import open_recording
-from objreg_ros.recording.camera_from_text import TOLD, with_camera
-from objreg_ros.recording.inputs import CAMERA_INFO, choose_inputs
+from objreg_ros.bridge.messages import camera_from_msg
+from objreg_tools.recording import open_recording
+from objreg_tools.recording.camera_from_text import GIVEN, with_camera
+from objreg_tools.recording.inputs import CAMERA_INFO, choose_inputs
 
-from .folders import noetic_bag, robot_bag, tum_folder
+from .sample_folders import noetic_bag, robot_bag, tum_folder
 
 CAMERA = "100,101,63.5,47.5,128,96"  # of twice the size
 
@@ -28,12 +28,12 @@ def test_the_camera_that_is_told_takes_the_place_of_any_other_in_the_size_of_the
     with open_recording(bags(tmp_path)[kind]) as opened:
         source = with_camera(opened, CAMERA)
         inputs = choose_inputs(source.topics)
-        assert (inputs.camera_info, inputs.depth) == (TOLD, "/depth/image") and inputs.complete
-        assert [topic.name for topic in source.topics.values() if topic.msgtype == CAMERA_INFO] == [TOLD]
+        assert (inputs.camera_info, inputs.depth) == (GIVEN, "/depth/image") and inputs.complete
+        assert [topic.name for topic in source.topics.values() if topic.msgtype == CAMERA_INFO] == [GIVEN]
         assert source.notes[-1] == "not used, as a camera is given: /camera_info"
         records = list(source.records(set(inputs.chosen().values())))
-        assert [record.topic for record in records].count(TOLD) == 1 and records[0].topic == TOLD
-        camera = from_msg.intrinsics(records[0].message)
+        assert [record.topic for record in records].count(GIVEN) == 1 and records[0].topic == GIVEN
+        camera = camera_from_msg.intrinsics(records[0].message)
         assert (camera.fx, camera.fy, camera.cx, camera.width, camera.height) == (50, 50.5, 31.5, 64, 48)
         assert len(records[0].cdr) > 100 and records[0].message.header.frame_id == "camera"
         assert {record.topic for record in source.records()} == source.topics.keys()
@@ -48,9 +48,9 @@ def test_a_recording_from_later_on_keeps_the_camera_for_who_comes_late(tmp_path:
     with open_recording(tum_folder(tmp_path / "tum")) as opened:
         source = with_camera(opened, CAMERA)
         later = source.start_ns + 1
-        assert TOLD in source.latched and TOLD not in source.obstacles() and TOLD not in source.offered_qos()
-        assert [r.topic for r in source.records([TOLD])] == [TOLD] and not list(source.records([TOLD], later))
-        assert [r.topic for r in source.records([TOLD], end_ns=later)] == [TOLD]
+        assert GIVEN in source.latched and GIVEN not in source.obstacles() and GIVEN not in source.offered_qos()
+        assert [r.topic for r in source.records([GIVEN])] == [GIVEN] and not list(source.records([GIVEN], later))
+        assert [r.topic for r in source.records([GIVEN], end_ns=later)] == [GIVEN]
         assert not list(source.records([]))
 
 

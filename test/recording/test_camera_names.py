@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.recording.camera_names import (
+from objreg_tools.recording.camera_names import (
     BY_FRAME,
     GENERICALLY_SAME,
     HALF,

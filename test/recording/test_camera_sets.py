@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from objreg_ros.recording.inputs import alternatives, choose_inputs, depth_of_others
+from objreg_tools.recording.inputs import alternatives, choose_inputs, depth_of_others
 
 from .test_inputs import topics
 

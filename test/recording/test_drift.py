@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import headers, motion_from_msg
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.recording import open_recording
-from objreg_ros.recording.drift import ODOM, Drift, DriftingOdometry, with_drifting_odometry
+from objreg_tools.recording import open_recording
+from objreg_tools.recording.drift import ODOM, Drift, DriftingOdometry, with_drifting_odometry
 
-from .folders import lost, tum_folder
+from .sample_folders import lost, tum_folder
 
 
 def walk(steps: int) -> list[np.ndarray]:
@@ -52,8 +52,8 @@ def test_every_true_pose_is_followed_by_odometry_of_its_stamp(tmp_path: Path) ->
     recording = open_recording(tum_folder(tmp_path))
     records = list(with_drifting_odometry(recording.records(), "/ground_truth", seed=3))
     odom = [r.message for r in records if r.topic == ODOM]
-    assert [from_msg.stamp_ns(m) for m in odom] == [0, 100_000_000, 200_000_000]
-    moved = np.linalg.norm(from_msg.odometry(odom[1]).T_odom_body[:3, 3])
+    assert [headers.stamp_ns(m) for m in odom] == [0, 100_000_000, 200_000_000]
+    moved = np.linalg.norm(motion_from_msg.odometry(odom[1]).T_odom_body[:3, 3])
     assert moved == pytest.approx(0.5, abs=0.1) and len(records) == 15
 
 

@@ -3,9 +3,9 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.recording.inputs import SOURCES, choose_inputs, parse_remaps
-from objreg_ros.recording.record import Topic
 from objreg_ros.segmenter.params import SegmenterNodeParams
+from objreg_tools.recording.inputs import SOURCES, choose_inputs, parse_remaps
+from objreg_tools.recording.record import Topic
 
 IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
 KINDS = {

@@ -8,12 +8,13 @@ import pytest
 
 from objreg_ros.bridge.camera.frames import Tie
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
-from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body, frame_tree, static_topics
-from objreg_ros.recording.troubles import warnings
+from objreg_tools.recording import Record, open_recording, write_rosbag2
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.recording.mounts import TRANSFORMS, camera_on_body, frame_tree, static_topics
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.recording.troubles import warnings
 
-from .folders import CAMERA, static
+from .sample_folders import CAMERA, static
 
 T_BODY_CAMERA = pose(rotation_from_vector(np.array([0.1, -1.2, 0.3])), np.array([0.2, 0.0, 0.5]))
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.recording import open_recording, write_rosbag2
+from objreg_tools.recording import open_recording, write_rosbag2
 
-from .folders import records, tum_folder
+from .sample_folders import records, tum_folder
 
 
 def test_nothing_is_no_recording(tmp_path: Path) -> None:

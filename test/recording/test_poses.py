@@ -6,10 +6,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from objreg_ros.recording import Record, messages
-from objreg_ros.recording.poses import passed_over, pose_of
+from objreg_tools.recording import Record
+from objreg_tools.recording.poses import passed_over, pose_of
+from objreg_tools.recording.rosbag import messages
 
-from .folders import lost
+from .sample_folders import lost
 
 
 def seen() -> Record:

@@ -12,10 +12,10 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from objreg_ros.recording import messages
-from objreg_ros.recording.record import Record, Recording, Topic, misnamed
+from objreg_tools.recording.record import Record, Recording, Topic, misnamed
+from objreg_tools.recording.rosbag import messages
 
-from .folders import CAMERA
+from .sample_folders import CAMERA
 
 INFO = messages.camera_info(CAMERA, 5, "camera")
 T_ORIGIN = np.eye(4)

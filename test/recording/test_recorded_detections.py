@@ -8,9 +8,9 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin
 
 from objreg_ros.bridge.messages import vision_from_msg
-from objreg_ros.recording import open_recording
-from objreg_ros.recording.record import Topic
-from objreg_ros.recording.recorded_detections import BOXES, NAMES, choose_detections, recorded_detections
+from objreg_tools.recording import open_recording
+from objreg_tools.recording.record import Topic
+from objreg_tools.recording.recorded_detections import BOXES, NAMES, choose_detections, recorded_detections
 
 from .vision import detected_bag
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.recording import Recording, open_recording, write_rosbag2
-from objreg_ros.recording.bags import latched_qos
-from objreg_ros.recording.inputs import Inputs, choose_inputs
-from objreg_ros.recording.record import Topic
-from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
+from objreg_ros.bridge.messages import headers
+from objreg_tools.recording import Recording, open_recording, write_rosbag2
+from objreg_tools.recording.inputs import Inputs, choose_inputs
+from objreg_tools.recording.record import Topic
+from objreg_tools.recording.replay import Selection, graph_names, read_ahead, recorded_names
+from objreg_tools.recording.rosbag.bags import latched_qos
 
-from .folders import STEP_NS, records, tum_folder
+from .sample_folders import STEP_NS, records, tum_folder
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_a_selection_begins_with_what_was_latched_before_it(
     with open_recording(latched_infos(tmp_path / "bag", *depths)) as recording:
         played = list(Selection({"/camera_info": "camera_info", "/image": "image"}, start=0.5).records(recording))
         latched, others = played[: len(told)], played[len(told) :]
-        assert [from_msg.stamp_ns(r.message) for r in latched] == [10**9 + k * STEP_NS for k in told]
+        assert [headers.stamp_ns(r.message) for r in latched] == [10**9 + k * STEP_NS for k in told]
         assert {(r.topic, r.stamp_ns) for r in latched} == {("/camera_info", others[0].stamp_ns)}
         assert [r.topic for r in others] == ["/image"] * 6
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.recording import Record, Recording, messages, open_recording, write_rosbag2
-from objreg_ros.recording.summary import describe_topics
+from objreg_tools.recording import Record, Recording, open_recording, write_rosbag2
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.recording.summary import describe_topics
 
-from .folders import records
+from .sample_folders import records
 
 
 def bag(path: Path, items: Iterator[Record] | list[Record]) -> Recording:

@@ -9,14 +9,15 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import pose
-from objreg_ros.recording import Record, Recording, messages, open_recording, write_rosbag2
-from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.recording.summary import describe_topics
-from objreg_ros.recording.troubles import troubles, warnings
+from objreg_tools.recording import Record, Recording, open_recording, write_rosbag2
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.recording.summary import describe_topics
+from objreg_tools.recording.troubles import troubles, warnings
 
-from .folders import CAMERA, records, static, tum_folder, uncalibrated
+from .sample_folders import CAMERA, records, static, tum_folder, uncalibrated
 
 
 def bag(path: Path, items: Iterator[Record] | list[Record]) -> Recording:

@@ -11,10 +11,11 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg
 from rosbags.typesys.store import Typestore
 
-from objreg_ros.recording import Record, messages
-from objreg_ros.recording.messages import standard_types
+from objreg_tools.recording import Record
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.recording.rosbag.messages import standard_types
 
-from .folders import records
+from .sample_folders import records
 
 DEFINITIONS = {
     "Point2D": "float64 x\nfloat64 y",

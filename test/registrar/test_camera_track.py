@@ -7,14 +7,14 @@ from dataclasses import replace
 
 from registration.samples import SECOND, frame, keyframe
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.keyframes.frame_window import Clock, SessionNumbers
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.camera_track import MOST_CAMERAS, CameraTracks, clock_refusals
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
 FRONT, REAR, OTHER = ("robot1", "front"), ("robot1", "rear"), ("robot2", "front")

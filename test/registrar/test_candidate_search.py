@@ -13,15 +13,15 @@ import pytest
 from registration.samples import box, candidate, keyframe
 
 from objreg_ros.bridge.node.worker import give_way
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.candidate_search import Budget, Means, Pools, Search
 from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration.candidate import Candidate
-from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams(threads=1, closures=2, candidates=3, thin_seconds=1.0, confirm_seconds=0.0)
 CUPS = (box("cup", (0.0, 0.0, 1.0)),)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from registration.samples import box, candidate, keyframe
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.registrar.closure import Accepted, closure_of, links_of, observations, rejected
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import ObjectPair
-from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
 CUP = box("cup", (0.0, 0.0, 1.0))

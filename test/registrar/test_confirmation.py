@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from registration.samples import box, candidate, keyframe, moved
 
-from objreg_ros.data import Array, Reason, Rejected
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.keyframes.jitter import Jitter
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.registrar.closure import Accepted, Waiting, waiting_of
 from objreg_ros.registrar.confirmation import Confirmation, Held, Tried
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.gate.verdict import judge
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.result import Registration
 from registrar.test_consistency import ASIDE, TRUE, passes
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from registration.samples import SECOND, moved
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.keyframes.jitter import Jitter
 from objreg_ros.registrar.consistency import MOST, REACH_M, Consistency, Standpoint, Statement, Support

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from objreg_ros.data import Frame, LoopClosure, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.frames import Frame
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.registrar import Registrar
 from registrar.test_registrar import AWAY, BESIDE, HERE, PARAMS, _frame

@@ -13,11 +13,14 @@ import pytest
 from registration import rooms
 from registration.samples import SECOND, candidate
 
-from objreg_ros.data import Array, Frame, LoopClosure, Reason
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure, Reason
+from objreg_ros.data.frames import Frame
 from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.registrar import summary
 from objreg_ros.registrar.exchange import Allowance, Exchange
 from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.peers import known, pending, wishes
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.summary import (
@@ -34,7 +37,6 @@ from objreg_ros.registrar.summary import (
 )
 from objreg_ros.registration import method_of
 from objreg_ros.registration.candidate import ObjectPair
-from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
 HERE = rooms.look_at((0.2, 0.0, 1.3), (1.8, 0.0, 0.75))
@@ -167,7 +169,7 @@ def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays(monkeypat
     a.registrar.track(replace(seen, objects=tuple(named), robot="a"))
     (window,) = a.registrar.end()
     assert a.exchange.announce(a.registrar.search(window)) is None
-    assert a.exchange.counters == {"dropped: too large to be told": 1}
+    assert a.exchange.counters == {"dropped: too large to announce": 1}
 
 
 def test_a_keyframe_without_objects_of_ours_is_not_asked_for() -> None:

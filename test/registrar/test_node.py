@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe
 from objreg_ros.bridge.node.diagnostics import refusal_of
 from objreg_ros.bridge.streams.keyframes_in import FromRobot
-from objreg_ros.data import Reason, Rejected
+from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.geometry import pose
 from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow
 from objreg_ros.memory.store import Store
@@ -172,7 +172,7 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
 def test_others_are_told_of_the_keyframe_that_a_save_ends(make: Making) -> None:
     node, told = make(), []
     node._robot, node._exchange = "robot", SimpleNamespace(announce=lambda outcome: outcome.keyframe_id)
-    node._others = SimpleNamespace(tell=lambda stamp_ns, summary: told.append((stamp_ns, summary)), close=lambda: None)
+    node._others = SimpleNamespace(send=lambda stamp_ns, summary: told.append((stamp_ns, summary)), close=lambda: None)
     node._registrar.track(frame(20, CUP))
     assert node._settle_and_save()[0] and told == [(20 * SECOND, 1)]
     node.close()

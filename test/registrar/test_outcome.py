@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import LoopClosure, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.registrar.outcome import Outcome, in_turn
 
 

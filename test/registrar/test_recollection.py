@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from registration.samples import SECOND, box, candidate, keyframe
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.closure import Accepted, waiting_of
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
 THINGS = (box("cup", (0, 0, 1), instance=4), box("book", (0.4, 0, 1), instance=5))

@@ -14,7 +14,9 @@ import pytest
 from registration import rooms
 from registration.samples import SECOND, candidate, keyframe
 
-from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.frames import Frame
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.keyframes.frame_window import Arrival, Clock
 from objreg_ros.keyframes.fusion import fuse
@@ -23,10 +25,10 @@ from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar import registrar as module
 from objreg_ros.registrar.closure import links_of
 from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.engine import Engine
-from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
 HERE = rooms.look_at((0.2, 0.0, 1.3), (1.8, 0.0, 0.75))

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from registration.samples import SECOND, keyframe, moved
 
-from objreg_ros.data import Array, Frame, LoopClosure
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Frame
 from objreg_ros.geometry import inverse, pose_error, rotation_from_vector
 from objreg_ros.keyframes.keyframer import SILENCE_S
 from objreg_ros.registrar.relocalisation import ALONE_ODDS, Relocalisation, drift, fused

@@ -14,17 +14,17 @@ from pathlib import Path
 from registration.rooms import keyframe, seen_from
 
 from objreg_ros import keyframes, memory, registration
-from objreg_ros.data import Frame
+from objreg_ros.data.frames import Frame
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_ros.registration.params import RegistrarParams
 
 ROOT = Path(__file__).parents[2]
 # In a process of its own: what other tests have compiled says nothing of `warm`.
 FRESH = """
 import json
 from registrar.test_warm import kernels, real_run
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.warm import warm
 warm(RegistrarParams())
 before = kernels()

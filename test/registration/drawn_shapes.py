@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array, Intrinsics, ObjectCloud, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import ObjectCloud, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotate, transform
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject
 from registration.rooms import look_at

@@ -17,11 +17,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from objreg_ros import limits
-from objreg_ros.data import Array, Frame, ObjectCloud, Reason
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Reason
+from objreg_ros.data.frames import Frame, ObjectCloud
 from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import drawn
-from objreg_ros.registration.params import RegistrarParams
 
 MOST = limits.MOST_RANGE
 STEP_NS = 5_000_000_000

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Alignment, Array, Frame, Intrinsics, ObjectCloud, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Alignment
+from objreg_ros.data.frames import Frame, ObjectCloud, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project, inverse, pose, transform
 from objreg_ros.registration.candidate import Candidate, ObjectPair, Verification
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject

@@ -6,10 +6,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import back_project
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import KeyObject
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, prepare_sight
 from registration.samples import CAMERA, cloud, scene_view
 

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.data import View
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import inverse, pose_error, rotation_from_vector
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration import engine as engine_module
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.certainty import gravity_update
 from objreg_ros.registration.certainty.covariance import spread_of
 from objreg_ros.registration.engine import Engine, without_degeneracy
 from objreg_ros.registration.keyframe import Context, Keyframe
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose import competing_hypotheses
 from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN
 from objreg_ros.registration.propose.shortlist import Shortlist

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import ObjectCloud
+from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.registration.keyframe import KeyObject
 
 

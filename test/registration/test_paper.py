@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, skew, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration import paper
 from objreg_ros.registration.certainty.covariance import spread_of
 from objreg_ros.registration.paper import LEAST_PAIRS, PaperEngine, _one_to_one, register
-from objreg_ros.registration.params import RegistrarParams
 from registration import rooms
 
 PARAMS = RegistrarParams(method="paper")

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from objreg_ros.cli.settings import NODES, names_of, read_settings
-from objreg_ros.registration.params import RegistrarNodeParams
+from objreg_ros.registrar.params import RegistrarNodeParams
+from objreg_tools.cli.settings import NODES, names_of, read_settings
 
 
 def test_a_search_may_take_as_long_as_is_set_and_without_a_limit_for_ever() -> None:

@@ -10,8 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration import align, method_of
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of
@@ -19,7 +20,6 @@ from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import Refusal
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.paper import PaperEngine
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.prior import TIGHT_TRANSLATION_M, Prior
 from registration.rooms import keyframe, seen_from
 from registration.samples import candidate, moved

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from_rotation
 from objreg_ros.registration.candidate import KeypointAgreement
 from objreg_ros.registration.result import Registration, evidence_of

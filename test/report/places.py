@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 from registration.samples import box, keyframe, moved
 
-from objreg_ros.data import LoopClosure, ObjectCloud
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 
 SECOND = 1_000_000_000
 Shown = tuple[float, int, tuple[ObjectCloud, ...]]  # seconds, session, objects

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
-from objreg_ros.truth import Truth
+from objreg_tools.truth import Truth
 
 COUNT = 120
 STEP_NS = 100_000_000

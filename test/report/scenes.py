@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from objreg_ros.data import DepthImage, Intrinsics
-from objreg_ros.report.exports.run_scene import RunScene, scene_of
-from objreg_ros.report.run.run_summary import RunSummary
+from objreg_ros.data.images import DepthImage, Intrinsics
+from objreg_tools.report.exports.run_scene import RunScene, scene_of
+from objreg_tools.report.run.run_summary import RunSummary
 
 from .runs import STEP_NS, TRUTH, summary
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from objreg_ros.report.bundle import plotly_bundle
-from objreg_ros.report.page import page
-from objreg_ros.report.run.run_summary import RunSummary
+from objreg_tools.report.bundle import plotly_bundle
+from objreg_tools.report.page import page
+from objreg_tools.report.run.run_summary import RunSummary
 from report.run.test_thumbnails import Wall
 
 from .chromium import chromium

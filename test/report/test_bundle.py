@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from objreg_ros.report.bundle import plotly_bundle
+from objreg_tools.report.bundle import plotly_bundle
 
 
 @pytest.fixture(autouse=True)

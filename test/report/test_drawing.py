@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from objreg_ros.report.drawing import Plot, ticks
+from objreg_tools.report.drawing import Plot, ticks
 
 
 def test_ticks_are_round_and_within_the_bounds() -> None:

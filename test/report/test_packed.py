@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.report.packed import packed
+from objreg_tools.report.packed import packed
 
 
 def unpacked(told: dict[str, Any]) -> np.ndarray:

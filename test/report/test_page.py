@@ -8,12 +8,12 @@ from html.parser import HTMLParser
 
 import pytest
 
-from objreg_ros.report import page as pages
-from objreg_ros.report.bundle import plotly_bundle
-from objreg_ros.report.page import page
-from objreg_ros.report.run import clouds, thumbnails
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.truth import Truth
+from objreg_tools.report import page as pages
+from objreg_tools.report.bundle import plotly_bundle
+from objreg_tools.report.page import page
+from objreg_tools.report.run import clouds, thumbnails
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.truth import Truth
 
 from .runs import TRUTH, closure, summary, with_a_stray
 

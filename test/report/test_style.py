@@ -7,9 +7,9 @@ import re
 
 import pytest
 
-from objreg_ros.report.page import TEMPLATES, page
-from objreg_ros.report.run.figures import SERIES
-from objreg_ros.report.run.run_summary import RunSummary
+from objreg_tools.report.page import TEMPLATES, page
+from objreg_tools.report.run.figures import SERIES
+from objreg_tools.report.run.run_summary import RunSummary
 
 from .runs import TRUTH, summary
 

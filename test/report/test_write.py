@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording.folders import lost, records
+from recording.sample_folders import lost, records
 
-from objreg_ros.recording import write_rosbag2
-from objreg_ros.recording.inputs import Inputs
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.report.write import write_report
+from objreg_tools.recording import write_rosbag2
+from objreg_tools.recording.inputs import Inputs
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.report.write import write_report
 
 from .runs import summary
 
@@ -69,7 +69,7 @@ def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[RunSummary] = []
-    monkeypatch.setattr("objreg_ros.report.write.page", lambda chapters: told.append(chapters[0][0]) or "")
+    monkeypatch.setattr("objreg_tools.report.write.page", lambda loaded: told.append(loaded[0][0]) or "")
     write_rosbag2(tmp_path / "bag", records(3))
     rows = [{"stamp_ns": record.stamp_ns, "labels": [], "objects": []} for record in records(3)][::4]
     mounted = [0.3, 0.0, 1.1, -0.5, 0.5, -0.5, 0.5]  # looks ahead: optical z is the body's x
@@ -85,7 +85,7 @@ def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(
 def chosen(monkeypatch: pytest.MonkeyPatch) -> list[Inputs]:
     """What the pictures of a report are taken from."""
     seen: list[Inputs] = []
-    monkeypatch.setattr("objreg_ros.report.write.Album", lambda recording, inputs, rectified: seen.append(inputs))
+    monkeypatch.setattr("objreg_tools.report.write.Album", lambda recording, inputs, rectified: seen.append(inputs))
     return seen
 
 

@@ -19,10 +19,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.bridge.node import profile, qos
+from objreg_ros.bridge.messages import headers
+from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import CONNECTED, balance_of
+from objreg_ros.bridge.process import profile
 
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
 ANSWER_S = 60.0
@@ -53,7 +54,8 @@ class Graph:
 
     def command(self, room: str, *ros_args: str) -> list[str]:
         arguments = [word for pair in ros_args for word in pair.split(" ", 1)]
-        return [sys.executable, "-m", f"objreg_ros.{room}.node", "--ros-args", *arguments]
+        module = "objreg_mapper.node" if room == "mapper" else f"objreg_ros.{room}.node"
+        return [sys.executable, "-m", module, "--ros-args", *arguments]
 
     def environment(self) -> dict[str, str]:
         path = os.pathsep.join(filter(None, (str(REPOSITORY), os.environ.get("PYTHONPATH"))))
@@ -70,7 +72,7 @@ class Graph:
 
     def start_composed(self, *words: str) -> None:
         """Start all nodes in one process, called ``graph``."""
-        self._start("graph", [sys.executable, "-m", "objreg_ros.graph", *words])
+        self._start("graph", [sys.executable, "-m", "objreg_tools.graph", *words])
 
     def _start(self, name: str, command: list[str]) -> None:
         with self._log(name).open("wb") as log:
@@ -143,7 +145,7 @@ class Graph:
 
     @staticmethod
     def _is_of(message: Header, node: str, stamp_ns: int) -> bool:
-        return message.frame_id.startswith(f"{node} ") and from_msg.stamp_ns(message) == stamp_ns
+        return message.frame_id.startswith(f"{node} ") and headers.stamp_ns(message) == stamp_ns
 
     def balance(self, name: str, received: int) -> Balance:
         """The counters of a node once it has told that it received so many."""

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.bridge.messages import from_msg, to_msg
-from objreg_ros.data import ColourImage, DepthImage, Intrinsics
-from objreg_ros.recording.inputs import GRAPH_TOPICS, choose_inputs
-from objreg_ros.recording.opening import open_recording
+from objreg_ros.data.images import ColourImage, DepthImage, Intrinsics
+from objreg_tools.recording.inputs import GRAPH_TOPICS, choose_inputs
+from objreg_tools.recording.opening import open_recording
 
 CAMERA = Intrinsics(fx=262.5, fy=262.5, cx=159.5, cy=119.5, width=320, height=240)
 SECOND = 1_000_000_000

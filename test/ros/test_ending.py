@@ -15,7 +15,7 @@ import pytest
 from std_msgs.msg import Header
 
 from objreg_ros import limits
-from objreg_ros.data import Frame
+from objreg_ros.data.frames import Frame
 from objreg_ros.keyframes.own_size import OBJECTS
 from objreg_ros.memory.store import Store
 

@@ -13,7 +13,7 @@ from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import from_msg, headers
 from objreg_ros.bridge.messages.layout import table
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.diagnostics import refusal_of
@@ -86,7 +86,7 @@ def test_every_frame_passes_three_nodes_and_every_node_balances_its_books(
         assert (counters.published, counters.dropped, counters.lost) == (len(moments), {}, {}), room
     stamps = [moment.stamp_ns for moment in moments]
     for topic in WIRE:
-        assert [from_msg.stamp_ns(message) for message in running.received[topic]] == stamps, topic
+        assert [headers.stamp_ns(message) for message in running.received[topic]] == stamps, topic
     assert sum(message.width for message in running.received["objects"]) > 0
 
 

@@ -16,12 +16,14 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.messages import from_msg, to_msg, vision_to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.cli.simulate import camera_of, sensors_of
-from objreg_ros.data import Detections, LoopClosure, Odometry
-from objreg_ros.simulation.truth import TrueFrame, Truth, read_truth
-from objreg_ros.simulation.write import simulate
-from objreg_ros.truth import FALSE, within
-from objreg_ros.truth import Truth as TruePath
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Odometry
+from objreg_ros.data.images import Detections
+from objreg_tools.cli.commands.simulate import camera_of, sensors_of
+from objreg_tools.simulation.truth import TrueFrame, Truth, read_truth
+from objreg_tools.simulation.write import simulate
+from objreg_tools.truth import FALSE, within
+from objreg_tools.truth import Truth as TruePath
 
 from .graph import START_S, Graph
 from .moments import Moment, recorded

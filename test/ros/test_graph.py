@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from detector.discs import instances, require_objects, save_disc_model
 from nav_msgs.msg import Odometry
-from recording.folders import CAMERA, tum_folder
+from recording.sample_folders import CAMERA, tum_folder
 from sensor_msgs.msg import PointCloud2
 
 from objreg_ros.bridge.messages import from_msg

@@ -15,7 +15,8 @@ from std_msgs.msg import Header, String
 
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.messages.layout import OBJECTS
-from objreg_ros.data import Frame, Intrinsics
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.registrar.warm import drawn
 
 from .graph import Graph

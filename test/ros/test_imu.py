@@ -10,7 +10,7 @@ from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_msgs.msg import Header
 
 from objreg_ros.bridge.messages import to_msg
-from objreg_ros.data import Detections
+from objreg_ros.data.images import Detections
 from objreg_ros.sensor import gravity_sigma_deg
 
 from .graph import Graph

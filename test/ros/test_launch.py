@@ -16,7 +16,7 @@ import launch_ros  # noqa: F401  (the folder launch/ of the checkout would pass 
 import pytest
 from launch.events.process import ProcessExited
 from launch_ros.actions import LifecycleNode
-from recording.folders import tum_folder
+from recording.sample_folders import tum_folder
 
 from launch import LaunchContext
 

@@ -16,7 +16,7 @@ from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
 
 from objreg_ros.bridge.messages import to_msg
-from objreg_ros.data import Detections, PointCloud
+from objreg_ros.data.images import Detections, PointCloud
 from objreg_ros.geometry import back_project
 
 from .graph import Graph

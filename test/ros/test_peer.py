@@ -37,7 +37,7 @@ def asked(graph: Graph, home: Path) -> Iterator[Graph]:
     """Mapper, registrar and g2o adapter, as a user starts them."""
     graph.start("mapper", "mapper", f"-p graph_path:={home}/map.g2o")
     graph.start("registrar", "registrar", f"-p store:={home}/place.db")
-    graph.start_module("objreg_to_g2o", "objreg_ros.adapters.g2o", f"-p graph_path:={home}/out.g2o")
+    graph.start_module("objreg_to_g2o", "objreg_mapper.adapters.g2o", f"-p graph_path:={home}/out.g2o")
     graph.wait_for(lambda: {f"/{name}" for name in NODES} <= set(graph.counters), START_S, "the nodes")
     yield graph
     assert [graph.stop(name) for name in NODES] == [0] * len(NODES)

@@ -12,8 +12,8 @@ import pytest
 from objreg_ros.bridge.camera.transforms import is_installed
 from objreg_ros.bridge.messages import vision_to_msg
 from objreg_ros.bridge.messages.closures_msg import LoopClosureMsg
-from objreg_ros.cli.access import TF, Access, expanded
-from objreg_ros.cli.policy import Asked
+from objreg_tools.cli.access import TF, Access, expanded
+from objreg_tools.cli.commands.policy import Asked
 
 from .graph import START_S, Graph
 

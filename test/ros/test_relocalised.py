@@ -19,10 +19,11 @@ from std_srvs.srv import Trigger
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.streams import relocalised
-from objreg_ros.data import Array, Frame, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registration.params import RegistrarParams
 
 from .graph import START_S, Graph
 

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
-from recording.folders import robot_bag, tum_folder
+from recording.sample_folders import robot_bag, tum_folder
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge.messages import closures_msg, from_msg
+from objreg_ros.bridge.messages import closures_msg, from_msg, headers
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.diagnostics import refusal_of
 
@@ -33,7 +33,7 @@ QUIET_S = 1.0  # without another message
 
 def objreg(graph: Graph, *words: str, seconds: float = 600) -> str:
     """The output of the command, while messages come in."""
-    command = [sys.executable, "-m", "objreg_ros.cli", *words]
+    command = [sys.executable, "-m", "objreg_tools.cli", *words]
     with subprocess.Popen(command, env=graph.environment(), stdout=subprocess.PIPE, text=True) as process:
         graph.wait_for(lambda: process.poll() is not None, seconds, " ".join(words))
         assert process.stdout is not None
@@ -99,7 +99,7 @@ def test_a_paced_replay_keeps_its_pace_and_tells_the_time(fresh: Graph, tmp_path
     folder = tum_folder(tmp_path / "tum", frames=11)
     output = objreg(fresh, "replay", str(folder), "--clock", "--rate", "2", "--start", "0.2", "--wait", str(START_S))
     assert "9 image" in output and "9 depth/image" in output
-    times = [from_msg.stamp_ns(m.clock) for m in fresh.received["/clock"]]
+    times = [headers.stamp_ns(m.clock) for m in fresh.received["/clock"]]
     assert times == sorted(times) and times[-1] == 10**9
 
 
@@ -111,7 +111,7 @@ def test_everything_is_played_but_for_types_that_are_not_installed(fresh: Graph,
 
 
 def test_a_lossless_replay_without_nodes_says_so(fresh: Graph, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "objreg_ros.cli", "replay", str(tum_folder(tmp_path / "tum")), "--lossless"]
+    command = [sys.executable, "-m", "objreg_tools.cli", "replay", str(tum_folder(tmp_path / "tum")), "--lossless"]
     done = subprocess.run([*command, "--wait", "0"], env=fresh.environment(), capture_output=True, text=True)
     assert done.returncode == 1 and "expected the nodes to publish `finished`, got none" in done.stderr
 
@@ -121,7 +121,7 @@ def test_a_replay_that_is_told_to_end_does_so_with_the_usual_status(
     how: signal.Signals, status: int, fresh: Graph, tmp_path: Path
 ) -> None:
     words = ["replay", str(tum_folder(tmp_path / "tum")), "--loop", "--wait", "0"]
-    command = [sys.executable, "-m", "objreg_ros.cli", *words]
+    command = [sys.executable, "-m", "objreg_tools.cli", *words]
     with subprocess.Popen(command, env=fresh.environment(), stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         while "nobody listens to /depth/image" not in process.stderr.readline():  # then it plays

@@ -22,7 +22,9 @@ from std_msgs.msg import Header
 from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.bridge.messages.keyframes_msg import read_keyframe
 from objreg_ros.bridge.node import qos
-from objreg_ros.data import Array, Frame, LoopClosure, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.geometry import inverse, pose, pose_error
 from objreg_ros.memory.store import Store
 

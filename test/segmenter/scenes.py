@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import DepthImage, Detections, Intrinsics
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.surface.cells import cell_size, reduce
 from objreg_ros.segmenter.surface.support import Ground, find_supports

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from objreg_ros.data import UNNAMED, DepthImage, Detections, Intrinsics, ObjectCloud, PointCloud
+from objreg_ros.data.frames import UNNAMED, ObjectCloud
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics, PointCloud
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.organise import organise

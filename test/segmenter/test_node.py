@@ -19,7 +19,7 @@ from std_msgs.msg import String
 from objreg_ros.bridge.camera import lenses
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.data import DepthImage, Detections, Intrinsics
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.lens import Lens
 from objreg_ros.segmenter.node import LOOK_S, SegmenterNode
 from objreg_ros.segmenter.segment import Segmenter

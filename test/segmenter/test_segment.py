@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import UNNAMED, DepthImage, Detections, Intrinsics, PointFlag
+from objreg_ros.data.frames import UNNAMED, PointFlag
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 
 import objreg_ros.segmenter
-from objreg_ros.data import DepthImage, Detections
+from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.segmenter.segment import Segmenter
 
 from .scenes import CAMERA, SMALL, Scene

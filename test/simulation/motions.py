@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from objreg_ros.geometry import pose, rotation_angle, transform
-from objreg_ros.simulation.mesh import Mesh
-from objreg_ros.simulation.model import turn
+from objreg_tools.simulation.world.mesh import Mesh
+from objreg_tools.simulation.world.model import turn
 
 
 def about(axis: str, degrees: float, centre: np.ndarray) -> np.ndarray:

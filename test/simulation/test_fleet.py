@@ -9,10 +9,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics
-from objreg_ros.simulation.fleet import make_fleet
-from objreg_ros.simulation.render import Rendering, render
-from objreg_ros.simulation.scenarios import Story
+from objreg_ros.data.images import Intrinsics
+from objreg_tools.simulation.fleet import make_fleet
+from objreg_tools.simulation.rendering.render import Rendering, render
+from objreg_tools.simulation.scenarios import RecordingPlan
 
 from .motions import speeds
 
@@ -21,14 +21,14 @@ FRAMES = 48
 
 
 @cache
-def robots() -> list[Story]:
+def robots() -> list[RecordingPlan]:
     return make_fleet("robots", 0, FRAMES)  # three rooms take a second
 
 
 @cache
 def views(robot: int) -> list[Rendering]:
-    story = robots()[robot]
-    return [render(story.scenes[0], T, SMALL, with_colour=False) for T in story.T_world_camera[::4]]
+    plan = robots()[robot]
+    return [render(plan.scenes[0], T, SMALL, with_colour=False) for T in plan.T_world_camera[::4]]
 
 
 def seen_on_tables(robot: int) -> list[set[int]]:
@@ -43,16 +43,16 @@ def seen_on_tables(robot: int) -> list[set[int]]:
 
 
 def test_robots_move_at_the_speed_of_a_hand_and_by_one_rate() -> None:
-    assert len(robots()) == 3 and len({story.rate for story in robots()}) == 1
-    for story in robots():
-        moved, turned = speeds(story.T_world_camera, story.rate)
-        assert len(story) == FRAMES and moved.max() < 0.55 and turned.max() < 45.0
+    assert len(robots()) == 3 and len({plan.rate for plan in robots()}) == 1
+    for plan in robots():
+        moved, turned = speeds(plan.T_world_camera, plan.rate)
+        assert len(plan) == FRAMES and moved.max() < 0.55 and turned.max() < 45.0
 
 
 def test_each_robot_begins_a_third_of_a_way_after_the_one_before() -> None:
     way_ns = FRAMES / robots()[0].rate * 1e9
-    assert [story.start_ns / way_ns for story in robots()] == pytest.approx([0, 1 / 3, 2 / 3], abs=1e-6)
-    assert [story.robot for story in robots()] == ["robot1", "robot2", "robot3"]
+    assert [plan.start_ns / way_ns for plan in robots()] == pytest.approx([0, 1 / 3, 2 / 3], abs=1e-6)
+    assert [plan.robot for plan in robots()] == ["robot1", "robot2", "robot3"]
 
 
 @pytest.mark.parametrize(("a", "b"), [*combinations(range(3), 2)])
@@ -64,11 +64,8 @@ def test_each_pair_of_robots_sees_the_same_objects_of_a_table(a: int, b: int) ->
 def test_no_robot_sees_what_all_see_alone() -> None:
     """The first never comes to the last room, the second never to the first, and the third goes to all."""
     visited = [
-        [
-            min(np.linalg.norm(story.T_world_camera[:, :2, 3] - p.centre[:2], axis=1)) < 1.5
-            for p in story.scenes[0].places
-        ]
-        for story in robots()
+        [min(np.linalg.norm(plan.T_world_camera[:, :2, 3] - p.centre[:2], axis=1)) < 1.5 for p in plan.scenes[0].places]
+        for plan in robots()
     ]
     assert visited == [[True, True, False], [False, True, True], [True, True, True]]
 
@@ -80,7 +77,7 @@ def test_nobody_walks_through_a_wall_or_a_table() -> None:
 
 
 def test_all_robots_are_in_one_world() -> None:
-    assert len({id(story.scenes[0]) for story in robots()}) == 1
+    assert len({id(plan.scenes[0]) for plan in robots()}) == 1
 
 
 def test_an_unknown_scenario_is_refused_with_those_there_are() -> None:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose_error, rotation_angle
-from objreg_ros.simulation.odometry import drifted, jittered, odometry_origin
-from objreg_ros.simulation.params import OdometryParams
-from objreg_ros.simulation.trajectory import Hand, Waypoint, carried
+from objreg_tools.simulation.odometry import drifted, jittered, odometry_origin
+from objreg_tools.simulation.params import OdometryParams
+from objreg_tools.simulation.trajectory import Hand, Waypoint, carried
 
 NONE = OdometryParams(distance_drift=0.0, turn_drift=0.0, tilt_error=0.0)
 

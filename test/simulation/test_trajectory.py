@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import is_rigid
-from objreg_ros.simulation.trajectory import Hand, Waypoint, around, carried
+from objreg_tools.simulation.trajectory import Hand, Waypoint, around, carried
 
 from .motions import speeds
 

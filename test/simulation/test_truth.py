@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.simulation.mesh import Material, box
-from objreg_ros.simulation.model import ObjectModel, Symmetry, half_turns, revolution
-from objreg_ros.simulation.render import Rendering, Seen
-from objreg_ros.simulation.scenarios import Story
-from objreg_ros.simulation.scene import Placed, Scene
-from objreg_ros.simulation.truth import FOLDER, FRAMES, MASKS, Truth, TruthWriter, read_truth
+from objreg_tools.simulation.rendering.render import Rendering, Seen
+from objreg_tools.simulation.scenarios import RecordingPlan
+from objreg_tools.simulation.truth import FOLDER, FRAMES, MASKS, Truth, TruthWriter, read_truth
+from objreg_tools.simulation.world.mesh import Material, box
+from objreg_tools.simulation.world.model import ObjectModel, Symmetry, half_turns, revolution
+from objreg_tools.simulation.world.scene import Placed, Scene
 
 CAMERA = Intrinsics(fx=13.125, fy=13.25, cx=7.5, cy=5.25, width=16, height=12)
 CENTRE = np.array([0.0, 0.0, 0.15])
@@ -37,7 +37,7 @@ def scene(*objects: Placed) -> Scene:
 
 BEFORE = scene(*(placed(k, label, 0.1 * k) for k, label in enumerate(KINDS, start=1)))
 AFTER = scene(placed(1, "book", 3.0))
-STORY = Story((BEFORE, AFTER), np.array([0, 1]), np.tile(np.eye(4), (2, 1, 1)), 30.0)
+STORY = RecordingPlan((BEFORE, AFTER), np.array([0, 1]), np.tile(np.eye(4), (2, 1, 1)), 30.0)
 T_WORLD_CAMERA = pose(rotation_from_vector(np.array([0.4, -1.0, 0.3])), np.array([1.0, 2.0, 3.0]))
 
 
@@ -56,11 +56,11 @@ def rendering(*seen: Placed) -> Rendering:
     return Rendering(nothing, nothing, None, instance, tuple(sights), T_WORLD_CAMERA, CAMERA)
 
 
-def written(recording: Path, story: Story = STORY, *images: Rendering) -> Truth:
+def written(recording: Path, plan: RecordingPlan = STORY, *images: Rendering) -> Truth:
     """The truth of a story, written and read again; by default of two frames, with the book in both."""
-    writer = TruthWriter(story, "loop", 7, CAMERA)
+    writer = TruthWriter(plan, "loop", 7, CAMERA)
     for k, image in enumerate(images or (rendering(*BEFORE.objects[:2]), rendering(*AFTER.objects))):
-        writer.add(STAMPS[k], int(story.scene_of[k]), image)
+        writer.add(STAMPS[k], int(plan.scene_of[k]), image)
     recording.mkdir(exist_ok=True)
     writer.write(recording)
     return read_truth(recording)
@@ -117,8 +117,8 @@ def test_a_mask_holds_the_number_of_the_object_of_every_pixel(tmp_path: Path) ->
 
 def test_more_objects_than_a_byte_counts_keep_their_numbers_in_the_mask(tmp_path: Path) -> None:
     many = scene(placed(1, "book", 0.0), placed(300, "mug", 1.0))
-    story = Story((scene(), many), np.array([1]), np.eye(4)[None], 30.0)
-    mask = written(tmp_path, story, rendering(*many.objects)).mask(STAMPS[0])
+    plan = RecordingPlan((scene(), many), np.array([1]), np.eye(4)[None], 30.0)
+    mask = written(tmp_path, plan, rendering(*many.objects)).mask(STAMPS[0])
     assert sorted(np.unique(mask)) == [0, 1, 300]
 
 
@@ -128,7 +128,7 @@ def test_the_mask_of_a_frame_that_there_is_not_is_a_key_error(tmp_path: Path) ->
 
 
 def test_an_empty_scene_has_a_truth_too(tmp_path: Path) -> None:
-    truth = written(tmp_path, Story((scene(),), np.array([0]), np.eye(4)[None], 30.0), rendering())
+    truth = written(tmp_path, RecordingPlan((scene(),), np.array([0]), np.eye(4)[None], 30.0), rendering())
     assert truth.objects == ({},) and truth.frames[0].seen == () and not truth.mask(STAMPS[0]).any()
 
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.simulation.trajectory import Waypoint
-from objreg_ros.simulation.visits import Look, between
+from objreg_tools.simulation.trajectory import Waypoint
+from objreg_tools.simulation.visits import Look, between
 
 
 def test_a_look_goes_about_the_table_from_its_start_to_its_stop() -> None:

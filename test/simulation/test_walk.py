@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import inverse, pose_error, vector_from_rotation
-from objreg_ros.simulation.walk import APART, LEAST_SIGMA, NEAR_M, PERIOD_NS, Walk, WalkParams, walk
+from objreg_tools.simulation.walk import APART, LEAST_SIGMA, NEAR_M, PERIOD_NS, Walk, WalkParams, walk
 
 PLAIN = WalkParams()
 LYING = WalkParams(false_share=0.2, agreeing_share=0.1)

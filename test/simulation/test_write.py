@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics
-from objreg_ros.recording import open_recording
-from objreg_ros.simulation.camera import LENSES
-from objreg_ros.simulation.params import RigParams
-from objreg_ros.simulation.scenarios import make_story
-from objreg_ros.simulation.truth import read_truth
-from objreg_ros.simulation.write import Sensors, simulate, write_story
+from objreg_ros.data.images import Intrinsics
+from objreg_tools.recording import open_recording
+from objreg_tools.simulation.params import RigParams
+from objreg_tools.simulation.scenarios import make_plan
+from objreg_tools.simulation.sensors.camera import LENSES
+from objreg_tools.simulation.truth import read_truth
+from objreg_tools.simulation.write import Sensors, simulate, write_plan
 
 SMALL = Sensors(intrinsics=Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120))
 FRAMES = 4
@@ -131,9 +131,9 @@ def test_a_rig_changes_the_pictures_and_not_the_truth(recorded: Path, bent: Path
 @pytest.fixture(scope="module")
 def of_robots(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """The same story of two robots, of which the second begins seven seconds later."""
-    story, folder = make_story("orbit", 1, frames=2), tmp_path_factory.mktemp("robots")
+    plan, folder = make_plan("orbit", 1, frames=2), tmp_path_factory.mktemp("robots")
     for robot, start_ns in (("robot1", 0), ("robot2", 7 * 10**9)):
-        write_story(folder / robot, replace(story, robot=robot, start_ns=start_ns), "orbit", 1, SMALL, points=True)
+        write_plan(folder / robot, replace(plan, robot=robot, start_ns=start_ns), "orbit", 1, SMALL, points=True)
     return [folder / "robot1", folder / "robot2"]
 
 

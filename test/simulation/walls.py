@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.simulation.light import looking
-from objreg_ros.simulation.mesh import Material, box
-from objreg_ros.simulation.model import ObjectModel, Symmetry
-from objreg_ros.simulation.params import DepthParams
-from objreg_ros.simulation.scene import Placed, Scene
+from objreg_tools.simulation.params import DepthParams
+from objreg_tools.simulation.rendering.light import looking
+from objreg_tools.simulation.world.mesh import Material, box
+from objreg_tools.simulation.world.model import ObjectModel, Symmetry
+from objreg_tools.simulation.world.scene import Placed, Scene
 
 PERFECT = DepthParams(
     noise_floor=0.0, noise_growth=0.0, quantum=0.0, baseline=0.0, dropout=0.0, edge_jitter=0.0,

@@ -10,9 +10,9 @@ import pytest
 from registration.samples import candidate, moved
 
 from objreg_ros.registration.gate.kinds import KINDS
-from objreg_ros.simulation.camera import SENSORS
+from objreg_tools.simulation.sensors.camera import SENSORS
 from training import evidence
-from training.evidence import RIGS, SCENARIOS, Rows, gather, rows_of, stories
+from training.evidence import RIGS, SCENARIOS, Rows, gather, plans, rows_of
 
 
 def rows(count: int, sensor: str = "kinect_v1") -> Rows:
@@ -23,7 +23,7 @@ def rows(count: int, sensor: str = "kinect_v1") -> Rows:
 
 
 def test_every_scenario_is_seen_by_every_sensor_in_every_rig_in_a_room_of_its_own() -> None:
-    told = stories(100)
+    told = plans(100)
     assert len(told) == len(SCENARIOS) * len(SENSORS) * len(RIGS)
     assert sorted(one.seed for one in told) == list(range(100, 100 + len(told)))
     assert len({one.name for one in told}) == len(told)
@@ -57,6 +57,6 @@ def test_readings_of_other_kinds_are_refused(tmp_path: Path) -> None:
 def test_a_recording_is_simulated_and_every_pair_that_the_gate_sees_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(evidence, "FRAMES", 24)
     monkeypatch.setattr(evidence, "RATE", 2.0)
-    found = gather(stories(7)[0])
+    found = gather(plans(7)[0])
     right = (found.error < (5.0, 10.0)).all(axis=1)
     assert len(found) > 0 and right.any() and (found.rank[:1] == 0).all() and set(found.sensor) == {"kinect_v1"}

@@ -9,7 +9,7 @@ import numpy as np
 import onnx  # noqa: F401  (the export needs it)
 import torch
 
-from objreg_ros.data import ColourImage
+from objreg_ros.data.images import ColourImage
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from training.export import export

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.gate.kinds import KINDS
 from training import likelihood
 from training.evidence import Rows
-from training.likelihood import accepted, balanced, fit, log_odds, main, reliability, steps_of, told_of, written
+from training.likelihood import accepted, balanced, begun_summary, fit, log_odds, main, reliability, steps_of, written
 
 COUNT = 4000
 CORRELATION = list(KINDS).index("correlation")
@@ -58,7 +58,7 @@ def test_a_weight_never_falls_where_evidence_gets_better_though_the_rows_say_so(
 
 def test_what_no_row_tells_weighs_nothing_and_what_some_lack_has_a_weight() -> None:
     rows = told()
-    right, _ = told_of(rows)
+    right, _ = begun_summary(rows)
     rows.readings[:, UNKNOWN] = np.where(right | (np.arange(COUNT) % 2 == 0), 0.3, np.nan)
     found = fit(rows)
     assert found.unknown["silhouettes"] < -0.5 and found.unknown["matched"] == 0.0

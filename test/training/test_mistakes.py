@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Detections
+from objreg_ros.data.images import Detections
 from training.augment import mosaic, window_at_the_middle
 from training.labels import LABELS
 from training.mistakes import CROP_HW, mistakes, window_around

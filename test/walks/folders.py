@@ -9,8 +9,8 @@ from pathlib import Path
 
 import cv2
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.recording import Record, open_recording, write_rosbag2
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers
+from objreg_tools.recording import Record, open_recording, write_rosbag2
 
 ODD_COLOUR = "/people/mask_preview"
 SPARE_DEPTH = "/spare/depth"
@@ -33,7 +33,7 @@ def tum_of(room: Path, folder: Path, frames: int, depth_scale: float = 5000, tol
             steps[~(steps > 0)] = 0
             cv2.imwrite(str(folder / f"depth/{_seconds(record)}.png"), steps.round().astype("uint16"))
         _write_truth(folder / "groundtruth.txt", opened.records(["/ground_truth"]))
-        info = from_msg.intrinsics(next(opened.records(["/camera_info"])).message)
+        info = camera_from_msg.intrinsics(next(opened.records(["/camera_info"])).message)
     camera = {"fx": info.fx, "fy": info.fy, "cx": info.cx, "cy": info.cy, "depth_scale": told_scale or depth_scale}
     (folder / "camera.yaml").write_text("".join(f"{name}: {value:g}\n" for name, value in camera.items()))
     return folder
@@ -48,7 +48,7 @@ def _write_truth(file: Path, records: Iterator[Record]) -> None:
 
 
 def _seconds(record: Record) -> str:
-    stamp_ns = from_msg.stamp_ns(record.message)
+    stamp_ns = headers.stamp_ns(record.message)
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9 // 1000:06d}"
 
 

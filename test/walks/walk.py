@@ -56,7 +56,7 @@ class Walk:
 
     def type(self, *words: str, ends: int = 0) -> Said:
         """Run `objreg` with these words; AssertionError where it ends otherwise, or with a traceback."""
-        command = [sys.executable, "-m", "objreg_ros.cli", *words]
+        command = [sys.executable, "-m", "objreg_tools.cli", *words]
         path = os.pathsep.join(filter(None, (str(REPOSITORY), os.environ.get("PYTHONPATH"))))
         environment = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
         done = subprocess.run(

@@ -83,22 +83,22 @@ class Calibration:
         return replace(self, k=k, p=p, width=width, height=height)
 
 
-def read_calibration(told: str) -> Calibration:
+def read_calibration(given: str) -> Calibration:
     """The camera that a user names: numbers ``fx,fy,cx,cy[,width,height]``, or a file.
 
     OSError for a file that is not there, ValueError for what is no camera: both say what was expected.
     """
-    return read_camera(told)[0]
+    return read_camera(given)[0]
 
 
-def read_camera(told: str) -> tuple[Calibration, tuple[str, ...]]:
+def read_camera(given: str) -> tuple[Calibration, tuple[str, ...]]:
     """As `read_calibration`, with notes for the user on what was chosen of a file."""
-    numbers = _numbers_of(told)
+    numbers = _numbers_of(given)
     if numbers is not None:
         return of_numbers(numbers), ()
-    file = Path(told).expanduser()
+    file = Path(given).expanduser()
     if not file.exists():
-        raise FileNotFoundError(f"camera: expected {FORM}, got {told!r}, which is no file")
+        raise FileNotFoundError(f"camera: expected {FORM}, got {given!r}, which is no file")
     try:
         parsed = parse_camera(read_camera_text(file))
         return of_file(parsed), tuple(f"{file.name}: {note}" for note in parsed.notes)
@@ -111,9 +111,9 @@ def of_file(parsed: CameraFile) -> Calibration:
     return of_mapping(parsed.values)
 
 
-def absolute(told: str) -> str:
+def absolute(given: str) -> str:
     """What names the same camera wherever it is read."""
-    return told if not told or _numbers_of(told) is not None else str(Path(told).expanduser().resolve())
+    return given if not given or _numbers_of(given) is not None else str(Path(given).expanduser().resolve())
 
 
 def of_numbers(numbers: Numbers) -> Calibration:

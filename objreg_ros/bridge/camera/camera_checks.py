@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import camera_from_msg
 from objreg_ros.plausibility import findings
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.plausibility.pinhole import differ, implausible
@@ -22,14 +22,14 @@ def check_camera(camera_info: Any, colour_info: Any = None, one_frame: bool = Fa
 
 
 def _matrices(camera_info: Any) -> Iterator[Finding]:
-    used, k = from_msg.intrinsics(camera_info), from_msg.disagreeing_k(camera_info)
+    used, k = camera_from_msg.intrinsics(camera_info), camera_from_msg.disagreeing_k(camera_info)
     if k is not None:
-        yield findings.matrices_disagree(from_msg.pinhole(camera_info, "p"), k, differ(used, k))
+        yield findings.matrices_disagree(camera_from_msg.pinhole(camera_info, "p"), k, differ(used, k))
     if why := implausible(used):
         yield findings.no_camera(why)
 
 
 def _beside(camera_info: Any, colour_info: Any) -> Iterator[Finding]:
-    depth, colour = from_msg.intrinsics(camera_info), from_msg.intrinsics(colour_info)
+    depth, colour = camera_from_msg.intrinsics(camera_info), camera_from_msg.intrinsics(colour_info)
     if (depth.width, depth.height) == (colour.width, colour.height) and differ(depth, colour):
         yield findings.cameras_disagree(depth, colour)

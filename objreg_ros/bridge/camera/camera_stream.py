@@ -10,7 +10,8 @@ import numpy as np
 
 from objreg_ros.bridge.camera.mount import Mount, Seat
 from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import Array, Frame, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.plausibility.findings import pasted
 from objreg_ros.plausibility.stream_monitor import StreamMonitor

@@ -17,8 +17,9 @@ import numpy as np
 from objreg_ros import limits
 from objreg_ros.bridge.camera import lenses
 from objreg_ros.bridge.camera.registered_depth import register
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import Array, ColourImage, DepthImage, Intrinsics, PointCloud
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import ColourImage, DepthImage, Intrinsics, PointCloud
 from objreg_ros.geometry import transform
 
 FindPose = Callable[[str, str], Array | None]
@@ -81,7 +82,7 @@ def depth_image(
     tie = _Tie(
         _frame(depth_message),
         _frame(picture) or colour_frame.lstrip("/") or _frame(cameras.colour),
-        from_msg.intrinsics(cameras.depth),
+        camera_from_msg.intrinsics(cameras.depth),
         view,
         None if picture is None else picture.rgb.shape[:2],
     )
@@ -193,7 +194,7 @@ class _Tie(NamedTuple):
 
 def _frame(message: Any) -> str:
     """The frame of a message or picture; empty where it has none."""
-    return "" if message is None else from_msg.frame_id(message).lstrip("/")
+    return "" if message is None else headers.frame_id(message).lstrip("/")
 
 
 def _aside(T: Array | None) -> bool:
@@ -209,7 +210,7 @@ def _colour_camera(camera_info: Any, picture: ColourImage | None) -> Intrinsics 
     if camera_info is None:
         return None
     try:
-        camera = from_msg.intrinsics(camera_info)
+        camera = camera_from_msg.intrinsics(camera_info)
     except ValueError:
         return None
     fits = picture is None or picture.rgb.shape[:2] == (camera.height, camera.width)

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import JUMP_NS, Array
+from objreg_ros.bridge.messages import headers
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import JUMP_NS
 from objreg_ros.geometry import interpolate, inverse, pose, rotation_from_quaternion
 
 MOST_FRAMES = 10_000  # what says more is no robot
@@ -162,7 +163,7 @@ class FrameTree:
         if edge is not None and (edge.fixed is not None or child not in self._followed):
             return
         sample = _sample(one, parent, child)
-        stamp_ns = from_msg.stamp_ns(one)
+        stamp_ns = headers.stamp_ns(one)
         if edge is None:
             edge = self._edge(parent, child)
             self._follow()
@@ -276,7 +277,7 @@ def _product(edges: list[Edge], stamp_ns: int | None) -> Array | None:
 def _sample(one: Any, parent: str, child: str) -> Sample:
     """The numbers of a transform; ValueError for names too long, no rotation, and what is beyond all measure."""
     for name in (parent, child):
-        from_msg.bounded(name, "tf")
+        headers.bounded(name, "tf")
     where, turn = one.transform.translation, one.transform.rotation
     sample = float(where.x), float(where.y), float(where.z), float(turn.x), float(turn.y), float(turn.z), float(turn.w)
     if not all(abs(metres) <= limits.MOST_DISTANCE for metres in sample[:3]):

@@ -19,15 +19,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import DepthImage, Detections, Intrinsics, PointCloud
+from objreg_ros.bridge.messages import camera_from_msg, from_msg
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics, PointCloud
 from objreg_ros.lens import MODELS, UPRIGHT, Lens
 
 RECTIFIED = re.compile(r"(?<![a-z])(un)?rect|Rect|undist")  # in the name of a topic; not in direct
 UNTURNED = 1e-6  # of an entry of R
 KEPT = 4  # lenses: a driver may change between a few
 OTHERWISE = "set segmenter.rectified to all to take the pictures as they are"
-NONE_TOLD = "none stated: taken as rectified"
+NONE_STATED = "none stated: taken as rectified"
 
 Numbers = tuple[float, ...]
 
@@ -73,7 +73,7 @@ def detections(found: Detections, camera_info: Any, raw: Raw = Raw(), cloud: Poi
 def describe(camera_info: Any, raw: Raw = Raw(), points: bool = False) -> str:
     """What is assumed of the lens of a camera, for a user; ValueError for a lens that cannot be undone."""
     if not is_distorted(camera_info):
-        return NONE_TOLD
+        return NONE_STATED
     if points:
         return f"{_model(camera_info)} stated; points are taken as they come"
     lens = lens_of(camera_info, raw)
@@ -102,11 +102,11 @@ def lens_of(camera_info: Any, raw: Raw = Raw()) -> Lens | None:
     if len(D) > max(map(max, MODELS.values())):
         raise ValueError(f"camera_info: expected at most 14 coefficients of distortion, got {len(D)}; {OTHERWISE}")
     R = _rotation(camera_info)
-    as_told = R == UPRIGHT or not raw.depth
-    bent = from_msg.pinhole(camera_info, "k")
-    straight = from_msg.intrinsics(camera_info) if as_told else bent
+    as_stated = R == UPRIGHT or not raw.depth
+    bent = camera_from_msg.pinhole(camera_info, "k")
+    straight = camera_from_msg.intrinsics(camera_info) if as_stated else bent
     try:
-        return _lens(_model(camera_info), tuple(D.tolist()), _key(bent), _key(straight), R if as_told else UPRIGHT)
+        return _lens(_model(camera_info), tuple(D.tolist()), _key(bent), _key(straight), R if as_stated else UPRIGHT)
     except ValueError as error:
         raise ValueError(f"camera_info: {error}; {OTHERWISE}") from error
 

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from objreg_ros.bridge.camera.chains import body_of
 from objreg_ros.bridge.camera.frames import MOST_FRAMES, FrameTree, Tie
-from objreg_ros.data import Array, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Odometry
 
 WHERE = {Tie.STATIC: "/tf_static has", Tie.CONSTANT: "/tf repeats", Tie.MOVING: "/tf moves"}
 CAMERAS = re.compile(r"cam(era)?([^a-z]|$)|(^|_)orb(_|$|slam)", re.IGNORECASE)
@@ -55,14 +56,14 @@ class Seated(NamedTuple):
 class Mount:
     """The pose of the camera on the body of the odometry.
 
-    ``told`` is the value of a parameter, which wins; without one, ``tree`` is asked. ``say`` receives each assumption,
+    ``given`` is the value of a parameter, which wins; without one, ``tree`` is asked. ``say`` receives each assumption,
     and receives it again only where it changes. ``nameless`` is the body of an odometry that names none.
     """
 
     def __init__(
-        self, told: Array | None, tree: FrameTree | None = None, say: Callable[[str], None] = lambda text: None
+        self, given: Array | None, tree: FrameTree | None = None, say: Callable[[str], None] = lambda text: None
     ) -> None:
-        self._told, self._say = told, say
+        self._given, self._say = given, say
         self._tree = FrameTree() if tree is None else tree
         self._said: dict[tuple[str, str], str] = {}
         self._asked = ("", "")  # the body and the camera of the last question
@@ -70,34 +71,34 @@ class Mount:
         self.unknown = False  # whether the last answer was `Seat.UNKNOWN`
 
     def T_body_camera(
-        self, words: Sequence[Odometry] | None, camera_frame: str, stamp_ns: int | None = None
+        self, samples: Sequence[Odometry] | None, camera_frame: str, stamp_ns: int | None = None
     ) -> Array | None:
         """The pose (4, 4) of the camera on the body of these odometry samples; None where the two are one.
 
         None too where it is not known: `seated` distinguishes the two.
         """
-        return self.seated(words, camera_frame, stamp_ns).T_body_camera
+        return self.seated(samples, camera_frame, stamp_ns).T_body_camera
 
-    def seated(self, words: Sequence[Odometry] | None, camera_frame: str, stamp_ns: int | None = None) -> Seated:
+    def seated(self, samples: Sequence[Odometry] | None, camera_frame: str, stamp_ns: int | None = None) -> Seated:
         """What is known of the camera on the body of these odometry samples at a time, by default that of the last.
 
         `Seat.ONE_PLACE` without any.
         """
-        found = self._find(words, camera_frame.lstrip("/"), stamp_ns)
+        found = self._find(samples, camera_frame.lstrip("/"), stamp_ns)
         self.unknown = found.seat is Seat.UNKNOWN
         return found
 
     @property
     def reached_ns(self) -> int | None:
         """Until when the joints between body and camera are known; None where none moves, or before a question."""
-        return self._tree.reached_ns(*self._asked) if self._told is None else None
+        return self._tree.reached_ns(*self._asked) if self._given is None else None
 
-    def _find(self, words: Sequence[Odometry] | None, camera: str, stamp_ns: int | None) -> Seated:
-        if self._told is not None:
-            return Seated(Seat.KNOWN, self._told)
-        if not words:
+    def _find(self, samples: Sequence[Odometry] | None, camera: str, stamp_ns: int | None) -> Seated:
+        if self._given is not None:
+            return Seated(Seat.KNOWN, self._given)
+        if not samples:
             return Seated(Seat.ONE_PLACE)
-        odom, body = words[0].frame_id.lstrip("/"), words[0].child_frame_id.lstrip("/")
+        odom, body = samples[0].frame_id.lstrip("/"), samples[0].child_frame_id.lstrip("/")
         if not body and camera and self.nameless is Body.BASE:
             body = body_of(self._tree, odom, camera)
         if body == camera or (not body and self.nameless is Body.CAMERA):
@@ -110,7 +111,7 @@ class Mount:
                 body, camera, f"{what}: the registrar measures it, others take it to be one place; set T_base_camera"
             )
             return Seated(Seat.UNKNOWN)
-        return self._tied(tie, odom, body, camera, words[-1].stamp_ns if stamp_ns is None else stamp_ns)
+        return self._tied(tie, odom, body, camera, samples[-1].stamp_ns if stamp_ns is None else stamp_ns)
 
     def _tied(self, tie: Tie, odom: str, body: str, camera: str, stamp_ns: int) -> Seated:
         T = self._tree.between(body, camera, stamp_ns, odom)

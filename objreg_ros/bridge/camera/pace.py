@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from objreg_ros.data import JUMP_NS
+from objreg_ros.data.frames import JUMP_NS
 
 EARLY = 0.1  # of the period: so much before it is due a picture may come
 TURN = 6  # pictures that go on; then one is left out that is due
 
 
-class Pace:
+class RateLimit:
     """Lets ``max_rate`` pictures a second through on average, by their stamps; 0: every one.
 
     After every `TURN` one more is left out where some are: depth that comes with every third picture would else always

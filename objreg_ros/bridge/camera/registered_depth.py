@@ -14,7 +14,8 @@ import cv2
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.geometry import inverse
 
 SAME_SURFACE = 0.03  # of depth, between two pixels side by side; a grazing wall has less

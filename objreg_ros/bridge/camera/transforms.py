@@ -10,7 +10,7 @@ from objreg_ros.bridge.camera.frames import FrameTree
 from objreg_ros.bridge.camera.mount import Mount
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.node_base import NodeBase
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -47,6 +47,6 @@ def receive_frames(
     return tree
 
 
-def receive_mount(node: NodeBase, told: Array | None) -> Mount:
-    """The pose of the camera on the body of the odometry: ``told``, a parameter's value, else that of /tf."""
-    return Mount(told, receive_frames(node, told is None), node.get_logger().info)
+def receive_mount(node: NodeBase, given: Array | None) -> Mount:
+    """The pose of the camera on the body of the odometry: ``given``, a parameter's value, else that of /tf."""
+    return Mount(given, receive_frames(node, given is None), node.get_logger().info)

@@ -8,8 +8,8 @@ from typing import Any
 
 from objreg_ros.bridge.camera.chains import moved, odometry_edge
 from objreg_ros.bridge.camera.frames import Edge, FrameTree
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import Odometry
+from objreg_ros.bridge.messages import motion_from_msg
+from objreg_ros.data.frames import Odometry
 
 
 class Travel:
@@ -30,4 +30,4 @@ class Travel:
             self._of = self.camera
             self._edge = odometry_edge(self._tree, self.camera, self.outright) if self.camera else None
         if self._edge is not None:
-            yield from map(from_msg.odometry, moved(message, self._edge))
+            yield from map(motion_from_msg.odometry, moved(message, self._edge))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to the data types of data.py and back: the only folder that knows the fields of messages."""
+"""Messages to the data types of data/ and back: the only folder that knows the fields of messages."""

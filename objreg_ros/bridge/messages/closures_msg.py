@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.bridge.messages import from_msg, to_msg
-from objreg_ros.data import LoopClosure, ObjectMatch, Observation, Reason, Rejected, Robots
+from objreg_ros.bridge.messages import headers, motion_from_msg, to_msg
+from objreg_ros.data.closures import LoopClosure, ObjectMatch, Observation, Reason, Rejected, Robots
 
 try:
     from objreg_msgs.msg import Evidence, Moment, ObjectLandmark, ObjectLandmarks, Refusal
@@ -132,11 +132,11 @@ def read_loop_closure(message: Any) -> LoopClosure:
     _require_few(message.labels, "labels", limits.MOST_OBJECTS)
     _require_few(message.objects, "objects", limits.MOST_OBJECTS)
     return LoopClosure(
-        T_from_to=from_msg.motion(message),
+        T_from_to=motion_from_msg.motion(message),
         covariance=np.asarray(message.pose.covariance, np.float64).reshape(6, 6),
-        labels=tuple(from_msg.bounded(label, "label") for label in message.labels),
+        labels=tuple(headers.bounded(label, "label") for label in message.labels),
         matches=tuple(
-            ObjectMatch(label=from_msg.bounded(match.label, "label"), object_id=int(match.landmark_id))
+            ObjectMatch(label=headers.bounded(match.label, "label"), object_id=int(match.landmark_id))
             for match in message.objects
         ),
         evidence=_numbers(message.evidence),
@@ -148,8 +148,8 @@ def read_refusal(message: Any) -> Rejected:
     """The refusal in an objreg_msgs/Refusal. ValueError for an unknown reason."""
     return Rejected(
         reason=Reason(message.reason),
-        detail=from_msg.bounded(message.detail, "detail", limits.MOST_DETAIL),
-        T_from_to=from_msg.motion(message) if message.has_pose else None,
+        detail=headers.bounded(message.detail, "detail", limits.MOST_DETAIL),
+        T_from_to=motion_from_msg.motion(message) if message.has_pose else None,
         evidence=_numbers(message.evidence),
         **_ends(message),
     )
@@ -160,7 +160,7 @@ def read_landmarks(message: Any) -> tuple[Observation, ...]:
     _require_few(message.landmarks, "landmarks", limits.MOST_OBJECTS)
     return tuple(
         Observation(
-            label=from_msg.bounded(item.label, "label"),
+            label=headers.bounded(item.label, "label"),
             object_id=int(item.id),
             xyz=np.array([item.position.x, item.position.y, item.position.z], float),
         )
@@ -172,10 +172,10 @@ def _ends(message: Any) -> dict[str, Any]:
     """Stamp, frame, session and robot of both keyframes, as fields of a value."""
     fields: dict[str, Any] = {}
     for end, moment in (("from", message.from_moment), ("to", message.to_moment)):
-        fields[f"{end}_ns"] = from_msg.stamp_ns(moment)
-        fields[f"{end}_frame_id"] = from_msg.bounded(moment.frame_id, "frame_id")
+        fields[f"{end}_ns"] = headers.stamp_ns(moment)
+        fields[f"{end}_frame_id"] = headers.bounded(moment.frame_id, "frame_id")
         fields[f"{end}_session"] = _session(moment.session)
-        fields[f"{end}_robot"] = from_msg.bounded(moment.robot, "robot")
+        fields[f"{end}_robot"] = headers.bounded(moment.robot, "robot")
     return fields
 
 
@@ -189,7 +189,7 @@ def _session(text: str) -> int | None:
 
 def _numbers(evidence: Sequence[Any]) -> dict[str, float]:
     _require_few(evidence, "evidence", limits.MOST_EVIDENCE)
-    return {from_msg.bounded(item.name, "evidence"): float(item.value) for item in evidence}
+    return {headers.bounded(item.name, "evidence"): float(item.value) for item in evidence}
 
 
 def _require_few(items: Sequence[Any], of: str, most: int) -> None:

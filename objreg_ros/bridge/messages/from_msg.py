@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to the data types of data.py. Only this module and `closures_msg` know the fields of incoming messages.
+"""Messages to the data types of data/. Only this module and `closures_msg` know the fields of incoming messages.
 
 Reads attributes only, so the messages of rclpy and of rosbags (ROS 1 and 2) both fit. Pixels are in `pictures`, records
 in `layout`. A message that breaks its contract raises ValueError with what was expected and what came.
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from objreg_ros import limits
 from objreg_ros.bridge.messages import masks
+from objreg_ros.bridge.messages.camera_from_msg import intrinsics
+from objreg_ros.bridge.messages.headers import bounded, stamp_ns, stamp_within_limits, when_and_where
 from objreg_ros.bridge.messages.layout import (
     SUPPORT_ID,
     SUPPORT_LABEL,
@@ -28,68 +30,16 @@ from objreg_ros.bridge.messages.layout import (
     table,
     whole_numbers,
 )
+from objreg_ros.bridge.messages.motion_from_msg import motion, pose_at
 from objreg_ros.bridge.messages.pictures import colour_pixels, depth_metres, unpack_rgb
-from objreg_ros.data import (
-    SURROGATE,
-    UNNAMED,
-    ColourImage,
-    DepthImage,
-    Detections,
-    FeltGravity,
-    Frame,
-    ImuSample,
-    Intrinsics,
-    LoopClosure,
-    ObjectCloud,
-    Odometry,
-    PointCloud,
-    View,
-)
-from objreg_ros.geometry import interpolate, pose, rotation_from_quaternion
-from objreg_ros.plausibility.pinhole import differ, likelier
+from objreg_ros.data.checked import SURROGATE
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import UNNAMED, Frame, ObjectCloud, Odometry, View
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, PointCloud
 
 Array = NDArray[Any]
 
-UNIT = 0.01  # how far from 1 the length of a quaternion may be that was meant as one
-COLUMNS = {"p": 4, "k": 3}  # of the matrices of a camera_info
 MOMENT = re.compile(r"(?P<name>.*)@(?P<seconds>-?[0-9]{1,10})\.(?P<nanoseconds>[0-9]{9})", re.DOTALL)
-
-
-def stamp_ns(message: Any) -> int:
-    """The time of a message with a header, of a Header, of a Time or of a value, in integer nanoseconds.
-
-    ValueError for one that a ROS 2 message cannot carry: seconds of more than 32 bits, a second of nanoseconds.
-    """
-    if hasattr(message, "stamp_ns"):
-        return int(message.stamp_ns)
-    stamp = getattr(message, "header", message)
-    stamp = getattr(stamp, "stamp", stamp)
-    if not 0 <= stamp.nanosec < limits.NANOSECONDS:
-        raise ValueError(f"stamp: expected nanoseconds below {limits.NANOSECONDS}, got {stamp.nanosec}")
-    return _stamp_within_limits(int(stamp.sec) * limits.NANOSECONDS + int(stamp.nanosec))
-
-
-def _stamp_within_limits(stamp_ns: int) -> int:
-    if not limits.LEAST_STAMP_NS <= stamp_ns <= limits.MOST_STAMP_NS:
-        raise ValueError(f"stamp: expected seconds of 32 bits, got {stamp_ns // limits.NANOSECONDS}")
-    return stamp_ns
-
-
-def bounded(text: str, of: str, most: int = limits.MOST_NAME) -> str:
-    """The text; ValueError where it is longer than ``most`` characters."""
-    if len(text) > most:
-        raise ValueError(f"{of}: expected at most {most} characters, got {len(text)}: {text[:40]!r}…")
-    return text
-
-
-def frame_id(message: Any) -> str:
-    """The frame of a message with a header, or of a value."""
-    return str(getattr(message, "header", message).frame_id)
-
-
-def when_and_where(message: Any) -> dict[str, Any]:
-    """``stamp_ns`` and ``frame_id`` of a message with a header, as arguments of a data type."""
-    return {"stamp_ns": stamp_ns(message), "frame_id": bounded(message.header.frame_id, "frame_id")}
 
 
 # ------------------------------------------------------------------------------------------------------------- cameras
@@ -124,100 +74,6 @@ def depth_image(
     return DepthImage(depth=metres, rgb=rgb, intrinsics=camera, **when_and_where(depth_message))
 
 
-def intrinsics(message: Any) -> Intrinsics:
-    """The pinhole camera of a CameraInfo, with its binning and region of interest applied.
-
-    It is the projection matrix P, by which rectified and registered pictures are made (image_geometry's
-    PinholeCameraModel), and K where P is left at zeros, or cannot be that of the picture as K can. ValueError
-    for a camera that is not calibrated (ROS drivers say so with zeros in both).
-    """
-    camera = _windowed(_calibrated(message), message)
-    other = disagreeing_k(message)
-    return camera if other is None else likelier(camera, other)
-
-
-def disagreeing_k(message: Any) -> Intrinsics | None:
-    """The camera of K where P is another one that it cannot be; None where the two agree, or may differ.
-
-    They may where there is something to rectify (D, R), as far as P can be the camera of the picture too.
-    """
-    K, P, R = _camera_matrix(message, "k"), _camera_matrix(message, "p"), _numbers(message, "r")
-    if K[0, 0] == 0 or P[0, 0] == 0 or np.array_equal(K, P[:, :3]):
-        return None
-    try:
-        k, p = pinhole(message, "k"), pinhole(message, "p")
-    except ValueError:
-        return None
-    is_turned = R.any() and not np.allclose(R, np.eye(3).ravel(), atol=1e-6)
-    if np.any(_numbers(message, "d")) or is_turned:
-        return k if likelier(p, k) is k else None
-    return k if differ(p, k) else None
-
-
-def _numbers(message: Any, name: str) -> Array:
-    values = getattr(message, name) if hasattr(message, name) else getattr(message, name.upper(), ())  # as in ROS 1
-    return np.asarray(values, np.float64).ravel()
-
-
-def pinhole(message: Any, name: str) -> Intrinsics:
-    """The pinhole camera of one matrix of a CameraInfo, ``k`` or ``p``, with binning and region of interest applied.
-
-    ValueError where that one is not calibrated.
-    """
-    return _windowed(_usable(message, name), message)
-
-
-def _windowed(matrix: Array, message: Any) -> Intrinsics:
-    roi, (bin_x, bin_y) = message.roi, (max(1, int(b)) for b in (message.binning_x, message.binning_y))
-    width, height = int(roi.width) or int(message.width), int(roi.height) or int(message.height)
-    return Intrinsics(
-        fx=float(matrix[0, 0]) / bin_x,
-        fy=float(matrix[1, 1]) / bin_y,
-        cx=(float(matrix[0, 2]) - int(roi.x_offset)) / bin_x,
-        cy=(float(matrix[1, 2]) - int(roi.y_offset)) / bin_y,
-        width=width // bin_x,
-        height=height // bin_y,
-    )
-
-
-def is_calibrated(message: Any) -> bool:
-    """Whether a CameraInfo says anything of its camera: drivers leave K and P at zeros until somebody calibrated it."""
-    return any(_camera_matrix(message, name).flat[0] != 0 for name in "pk")
-
-
-def camera_of_cloud(
-    camera_info: Any, cloud: PointCloud, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE
-) -> Intrinsics | None:
-    """The camera that a cloud is organised or projected with; None without a ``camera_info``.
-
-    None too for one that is not calibrated where the cloud is organised, since that needs none; else ValueError.
-    """
-    if camera_info is None or (cloud.organised and not is_calibrated(camera_info)):
-        return None
-    camera = intrinsics(camera_info)
-    if camera.width * camera.height > most_pixels:
-        raise ValueError(f"camera_info: expected at most {most_pixels} pixels, got {camera.width} × {camera.height}")
-    return camera
-
-
-def _calibrated(message: Any) -> Array:
-    """P (3, 4) or, where it says nothing, K (3, 3), in pixels of the whole picture; ValueError if neither is usable."""
-    return _usable(message, "p" if _camera_matrix(message, "p").flat[0] != 0 else "k")
-
-
-def _usable(message: Any, name: str) -> Array:
-    matrix = _camera_matrix(message, name)
-    if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
-        got = matrix.ravel().tolist()
-        raise ValueError(f"camera_info: expected a calibrated {name.upper()} with focal lengths above 0, got {got}")
-    return matrix
-
-
-def _camera_matrix(message: Any, name: str) -> Array:
-    values = getattr(message, name) if hasattr(message, name) else getattr(message, name.upper())  # as in ROS 1
-    return np.asarray(values, np.float64).reshape(3, COLUMNS[name])
-
-
 def point_cloud(message: Any) -> PointCloud:
     """A PointCloud2 with x y z and, if it has them, rgb or rgba; N × 1 comes as 1 × N. NaN where not measured."""
     records = table(message, "x", "y", "z")
@@ -242,107 +98,6 @@ def _colours(records: Array) -> Array | None:
 # --------------------------------------------------------------------------------------------------------------- poses
 
 
-def odometry(message: Any) -> Odometry:
-    """An Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped; ValueError without a rotation."""
-    return Odometry(
-        T_odom_body=motion(message),
-        child_frame_id=bounded(getattr(message, "child_frame_id", ""), "child_frame_id"),
-        **when_and_where(message),
-    )
-
-
-def pose_at(moment_ns: int, words: Sequence[Odometry]) -> Array:
-    """``T_odom_body (4, 4)`` at a time, between the two odometry samples that enclose it; of one sample its own.
-
-    The nearer one's where their frames differ.
-    """
-    first, last = words[0], words[-1]
-    if first.stamp_ns == last.stamp_ns:
-        return first.T_odom_body
-    if first.frame_id != last.frame_id:
-        return (first if moment_ns - first.stamp_ns <= last.stamp_ns - moment_ns else last).T_odom_body
-    share = (moment_ns - first.stamp_ns) / (last.stamp_ns - first.stamp_ns)
-    return interpolate(first.T_odom_body, last.T_odom_body, min(1.0, max(0.0, share)))
-
-
-def level_gravity(moment_ns: int, words: Sequence[Odometry] | None, T_body_camera: Array | None = None) -> Array | None:
-    """The direction of gravity (3,) in the camera frame by an odometry whose frame is level with z up; else None.
-
-    ``words`` are the samples of `pose_at`. ``T_body_camera`` is the pose of the camera on the body of the odometry;
-    the identity if None.
-    """
-    if not words:
-        return None
-    T_level_body = pose_at(moment_ns, words)
-    T_level_camera = T_level_body if T_body_camera is None else T_level_body @ T_body_camera
-    return -T_level_camera[2, :3]
-
-
-def imu(message: Any) -> ImuSample:
-    """An Imu; a field whose covariance begins with -1 is not measured (REP-145).
-
-    Nor is an orientation that is no unit quaternion, or none but what an empty message holds. ValueError where what is
-    measured is not finite.
-    """
-    return ImuSample(
-        acceleration=_measured(message.linear_acceleration, "xyz", message.linear_acceleration_covariance),
-        angular_velocity=_measured(message.angular_velocity, "xyz", message.angular_velocity_covariance),
-        orientation=_orientation(message),
-        orientation_sigma_deg=_tilt_deg(message.orientation_covariance),
-        **when_and_where(message),
-    )
-
-
-def _measured(vector: Any, names: str, covariance: Any) -> Array | None:
-    return None if covariance[0] < 0 else np.array([getattr(vector, name) for name in names], float)
-
-
-def _orientation(message: Any) -> Array | None:
-    xyzw = _measured(message.orientation, "xyzw", message.orientation_covariance)
-    if xyzw is None or abs(float(np.linalg.norm(xyzw)) - 1.0) >= UNIT:
-        return None
-    is_empty = xyzw[3] == 1.0 and not np.any(message.orientation_covariance)
-    return None if is_empty else xyzw / np.linalg.norm(xyzw)
-
-
-def _tilt_deg(covariance: Any) -> float:
-    """The standard deviation of roll and pitch, the larger one; 0 where it is not known."""
-    variance = max(float(covariance[0]), float(covariance[4]))
-    return float(np.degrees(np.sqrt(variance))) if 0.0 < variance < np.inf else 0.0
-
-
-def gravity_at(moment_ns: int, words: Sequence[FeltGravity]) -> FeltGravity:
-    """The gravity at a time, between the two samples of a filter that enclose it; of one sample its own.
-
-    Its confidence is the lower of the two. It is the nearer sample's where their frames differ.
-    """
-    first, last = words[0], words[-1]
-    if first.stamp_ns == last.stamp_ns:
-        return first
-    share = min(1.0, max(0.0, (moment_ns - first.stamp_ns) / (last.stamp_ns - first.stamp_ns)))
-    mean = (1.0 - share) * first.gravity + share * last.gravity
-    length = float(np.linalg.norm(mean))
-    if first.frame_id != last.frame_id or length < 0.5:
-        return first if share <= 0.5 else last
-    return FeltGravity(
-        gravity=mean / length,
-        gravity_sigma_deg=max(first.gravity_sigma_deg, last.gravity_sigma_deg),
-        stamp_ns=moment_ns,
-        frame_id=first.frame_id,
-    )
-
-
-def motion(message: Any) -> Array:
-    """The (4, 4) motion of a message with a ``transform`` or a ``pose``, with covariance or without."""
-    if hasattr(message, "transform"):
-        where, turn = message.transform.translation, message.transform.rotation
-    else:
-        body = getattr(message.pose, "pose", message.pose)
-        where, turn = body.position, body.orientation
-    R = rotation_from_quaternion(np.array([turn.x, turn.y, turn.z, turn.w], float))
-    return pose(R, np.array([where.x, where.y, where.z], float))
-
-
 def loop_closure(message: Any) -> LoopClosure:
     """A constraint (nav_msgs/Odometry, frames ``name@sec.nsec``); its labels and evidence do not travel with it."""
     from_frame_id, from_ns = moment(message.header.frame_id)
@@ -364,7 +119,7 @@ def moment(frame_id: str) -> tuple[str, int]:
     if found is None:
         raise ValueError(f"constraint: expected a frame_id like camera@12.000000034, got {frame_id!r}")
     seconds, nanoseconds = int(found["seconds"]), int(found["nanoseconds"])
-    return found["name"], _stamp_within_limits(seconds * limits.NANOSECONDS + nanoseconds)
+    return found["name"], stamp_within_limits(seconds * limits.NANOSECONDS + nanoseconds)
 
 
 # --------------------------------------------------------------------------------------------------- between the nodes
@@ -408,13 +163,13 @@ def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int]
     """
     if isinstance(message, Detections):
         return message
-    xyxy, score, label, told_hw = _rows_of_table(message, names)
+    xyxy, score, label, stated_hw = _rows_of_table(message, names)
     order = np.argsort(-score, kind="stable")
     found = Detections(
         xyxy=np.ascontiguousarray(xyxy[order]),
         score=np.ascontiguousarray(score[order]),
         label=tuple(label[i] for i in order),
-        image_hw=told_hw or image_hw,
+        image_hw=stated_hw or image_hw,
         **when_and_where(message),
     )
     return replace(found, instances=masks.read_masks(table(message).reshape(-1)[order], found))
@@ -507,7 +262,7 @@ def frame(
     view_info: Any,
     gravity_message: Any,
     names: Mapping[int, str],
-    odometry_words: Sequence[Odometry] | None = None,
+    odometries: Sequence[Odometry] | None = None,
     T_body_camera: Array | None = None,
 ) -> Frame:
     """One frame from the segmenter's four messages, which must have one stamp, and the odometry around it, if any.
@@ -525,16 +280,16 @@ def frame(
         view=view(view_message, view_info),
         gravity=falls,
         gravity_confidence=confidence,
-        T_odom_camera=_camera_pose(stamps[0], odometry_words, T_body_camera),
+        T_odom_camera=_camera_pose(stamps[0], odometries, T_body_camera),
         **when_and_where(objects_message),
     )
 
 
-def followed(word: Frame, odometry_words: Sequence[Odometry] | None, T_body_camera: Array | None = None) -> Frame:
+def followed(unplaced: Frame, odometries: Sequence[Odometry] | None, T_body_camera: Array | None = None) -> Frame:
     """The segmenter's own frame, with the odometry around it as in `frame`."""
-    return replace(word, T_odom_camera=_camera_pose(word.stamp_ns, odometry_words, T_body_camera))
+    return replace(unplaced, T_odom_camera=_camera_pose(unplaced.stamp_ns, odometries, T_body_camera))
 
 
-def _camera_pose(moment_ns: int, words: Sequence[Odometry] | None, T_body_camera: Array | None) -> Array | None:
-    T_odom_body = pose_at(moment_ns, words) if words else None
+def _camera_pose(moment_ns: int, samples: Sequence[Odometry] | None, T_body_camera: Array | None) -> Array | None:
+    T_odom_body = pose_at(moment_ns, samples) if samples else None
     return T_odom_body if T_odom_body is None or T_body_camera is None else T_odom_body @ T_body_camera

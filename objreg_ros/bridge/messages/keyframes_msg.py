@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from sensor_msgs.msg import CompressedImage
 
 from objreg_ros import limits
-from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_ros.bridge.messages import headers, to_msg
 
 FORMAT = re.compile(r"objreg_keyframe run=(?P<run>[0-9a-f]{32}) began=(?P<began>-?\d{1,19}) first=(?P<first>\d{1,15})")
 
@@ -51,6 +51,6 @@ def read_keyframe(message: Any) -> SentKeyframe:
         raise ValueError(f"keyframe: expected format {FORMAT.pattern!r}, got {message.format[:100]!r}")
     if len(message.data) > limits.MOST_PACKED_KEYFRAME:
         raise ValueError(f"keyframe: expected at most {limits.MOST_PACKED_KEYFRAME} bytes, got {len(message.data)}")
-    frame_id = from_msg.bounded(message.header.frame_id, "frame_id")
+    frame_id = headers.bounded(message.header.frame_id, "frame_id")
     clock = int(found["began"]), int(found["first"])
-    return SentKeyframe(from_msg.stamp_ns(message), frame_id, found["run"], *clock, bytes(message.data))
+    return SentKeyframe(headers.stamp_ns(message), frame_id, found["run"], *clock, bytes(message.data))

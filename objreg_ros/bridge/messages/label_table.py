@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterable, Mapping
 
 from objreg_ros import limits
-from objreg_ros.data import UNNAMED
+from objreg_ros.data.frames import UNNAMED
 
 MOST_MET = 4096  # names that are met: a detector with more has put something else into its names
 
@@ -25,10 +25,10 @@ class LabelTable:
         self._lock = threading.Lock()
         self._met: list[str] = []
 
-    def adopt(self, told: Mapping[int, str]) -> None:
+    def adopt(self, stated: Mapping[int, str]) -> None:
         """Adopt a received table; names that were met and that it lacks get new numbers."""
         with self._lock:
-            self.names = self._with(dict(told), self._met)
+            self.names = self._with(dict(stated), self._met)
 
     def include(self, labels: Iterable[str]) -> bool:
         """Give a number to each name that has none; whether there was such a one.

@@ -13,7 +13,8 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from objreg_ros.bridge.messages import to_msg
-from objreg_ros.data import Frame, LoopClosure, Rejected
+from objreg_ros.data.closures import LoopClosure, Rejected
+from objreg_ros.data.frames import Frame
 
 Array = NDArray[Any]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from objreg_ros import limits
 from objreg_ros.bridge.messages.layout import MASK
 from objreg_ros.bridge.messages.pictures import require_picture
-from objreg_ros.data import Detections
+from objreg_ros.data.images import Detections
 
 Array = NDArray[Any]
 

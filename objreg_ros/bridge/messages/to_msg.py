@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The data types of data.py as ROS messages; the other direction is `from_msg`.
+"""The data types of data/ as ROS messages; the other direction is `from_msg`.
 
 Every function is pure: values in, one message out. Stamps and frame ids are those of the values. `layout` explains
 the fields of the tables.
@@ -36,19 +36,9 @@ from objreg_ros.bridge.messages.layout import (
     VIEW,
     fields_of,
 )
-from objreg_ros.data import (
-    UNNAMED,
-    ColourImage,
-    DepthImage,
-    Detections,
-    Frame,
-    Intrinsics,
-    LoopClosure,
-    ObjectCloud,
-    Observation,
-    Odometry,
-    PointCloud,
-)
+from objreg_ros.data.closures import LoopClosure, Observation
+from objreg_ros.data.frames import UNNAMED, Frame, ObjectCloud, Odometry
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics, PointCloud
 from objreg_ros.geometry import quaternion_from_rotation
 
 Array = NDArray[Any]
@@ -292,10 +282,10 @@ def pose(T: Array) -> Pose:
     return Pose(position=Point(x=x, y=y, z=z), orientation=_quaternion(T))
 
 
-def odometry(word: Odometry) -> OdometryMsg:
+def odometry(sample: Odometry) -> OdometryMsg:
     """The pose of a body; the covariance is left at zero, which says unknown."""
-    message = OdometryMsg(header=header(word.stamp_ns, word.frame_id), child_frame_id=word.child_frame_id)
-    message.pose.pose = pose(word.T_odom_body)
+    message = OdometryMsg(header=header(sample.stamp_ns, sample.frame_id), child_frame_id=sample.child_frame_id)
+    message.pose.pose = pose(sample.T_odom_body)
     return message
 
 

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import find_objects
 
 from objreg_ros import limits
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers
 from objreg_ros.bridge.messages.pictures import instance_numbers
-from objreg_ros.data import UNNAMED, Detections
+from objreg_ros.data.frames import UNNAMED
+from objreg_ros.data.images import Detections
 
 Array = NDArray[Any]
 
@@ -39,7 +40,7 @@ def detections(
     """What another detector found in a picture: its boxes, or an Image of masks, which has a size of its own."""
     if not hasattr(message, "encoding"):
         return boxes(message, names, image_hw)
-    return instances(instance_numbers(message, most_pixels), names, **from_msg.when_and_where(message))
+    return instances(instance_numbers(message, most_pixels), names, **headers.when_and_where(message))
 
 
 def picture_hw(image: Any, camera_info: Any) -> tuple[int, int] | None:
@@ -53,7 +54,7 @@ def picture_hw(image: Any, camera_info: Any) -> tuple[int, int] | None:
         return int(image.height), int(image.width)
     if camera_info is None:
         return None
-    camera = from_msg.intrinsics(camera_info)
+    camera = camera_from_msg.intrinsics(camera_info)
     return camera.height, camera.width
 
 
@@ -74,7 +75,7 @@ def boxes(message: Any, names: Mapping[int, str], image_hw: tuple[int, int]) -> 
         label=tuple(label for _, _, label, _ in found),
         ids=tuple(name for *_, name in found),
         image_hw=image_hw,
-        **from_msg.when_and_where(message),
+        **headers.when_and_where(message),
     )
 
 

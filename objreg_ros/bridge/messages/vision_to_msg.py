@@ -12,7 +12,8 @@ from geometry_msgs.msg import Point, Pose, Vector3
 from std_msgs.msg import Header
 
 from objreg_ros.bridge.messages.to_msg import header
-from objreg_ros.data import Detections, Frame, ObjectCloud
+from objreg_ros.data.frames import Frame, ObjectCloud
+from objreg_ros.data.images import Detections
 
 try:
     from vision_msgs.msg import (

@@ -12,7 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from objreg_ros.bridge.node.accounting import Balance
-from objreg_ros.data import Reason, Rejected
+from objreg_ros.data.closures import Reason, Rejected
 
 DROPPED = "dropped: "
 LOST = "lost in transport: "

@@ -14,9 +14,9 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.lifecycle.node import LifecycleNodeMixin
 from rclpy.task import Future
 
-from objreg_ros.bridge.node.lifetime import settle
 from objreg_ros.bridge.node.overridable import OverridableNode
 from objreg_ros.bridge.node.params import ManagedParams
+from objreg_ros.bridge.process.lifetime import settle
 
 DONE, REFUSED, BROKEN = (
     TransitionCallbackReturn.SUCCESS,

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 import traceback
 from collections import Counter
@@ -14,15 +13,12 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
-from rclpy.task import Future
 from std_msgs.msg import Header
-from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node import qos
@@ -30,18 +26,17 @@ from objreg_ros.bridge.node.accounting import Accounting
 from objreg_ros.bridge.node.choice import Choice
 from objreg_ros.bridge.node.diagnostics import CONNECTED, FOUND, diagnostic
 from objreg_ros.bridge.node.drops import Drops
-from objreg_ros.bridge.node.intra_process import IntraProcessBus, LocalPublisher, LocalSubscription, ValueQueue
 from objreg_ros.bridge.node.log import ThrottledLog
-from objreg_ros.bridge.node.managed import ManagedNode
 from objreg_ros.bridge.node.missed import Missed
 from objreg_ros.bridge.node.parameters import Parameters
 from objreg_ros.bridge.node.params import ManagedParams, NodeBaseParams
+from objreg_ros.bridge.node.services import ServingNode
 from objreg_ros.bridge.node.watch import Watch
 from objreg_ros.bridge.node.worker import Worker
+from objreg_ros.bridge.process.intra_process import IntraProcessBus, LocalPublisher, LocalSubscription, ValueQueue
 from objreg_ros.params import Params
 from objreg_ros.plausibility.finding import Finding
 
-REST = 5.0  # times as long as a service worked it then rests
 INACTIVE = "inactive"  # why a frame ends that came to a managed node that is not active
 
 
@@ -53,13 +48,13 @@ class DroppedError(Exception):
         self.reason = reason
 
 
-class NodeBase(ManagedNode):
+class NodeBase(ServingNode):
     """A node with declared parameters, one worker, counters, diagnostics at 1 Hz and an acknowledgement of each frame.
 
     A subclass listens in `open`, calls `accept` once for each frame, and hands it to ``worker`` as (stamp_ns, payload)
     when it is complete and was `let_in`. The worker calls `compute`; what that drops or refuses is counted, logged and
     leaves the node running.
-    ``indoors`` is what the nodes of this process hand over to each other; nothing if None.
+    ``bus`` passes values between the nodes of this process; None where each has a process of its own.
     """
 
     def __init__(self, name: str, *kinds: type[Params], bus: IntraProcessBus | None = None) -> None:
@@ -68,8 +63,6 @@ class NodeBase(ManagedNode):
         self.settings = Parameters(self, *kinds, NodeBaseParams)
         self.settings.changed, self.settings.are_open = self._adopt_if_open, lambda: not self.is_open
         self._bugs: set[str] = set()  # those that were logged
-        self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
-        self._aside: list[threading.Thread] = []
         self.throttled = ThrottledLog(self.get_logger().warning)
         self._finished = self.create_publisher(Header, "finished", qos.stage(depth=1000))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.stage())
@@ -315,73 +308,6 @@ class NodeBase(ManagedNode):
     def _overtaken(self, job: tuple[int, Any]) -> None:
         self.drop(job[0], "overtaken")  # by a newer frame: usual where the camera is faster than the node
 
-    # Services
-
-    def aside(self, work: Callable[[], Any]) -> Future:
-        """What ``work`` gives, done by a thread of its own; for a service to await, so that no subscription waits.
-
-        The service has to be in the group ``apart``: a group does nothing else while one of its callbacks waits.
-        """
-        executor = self.executor
-        future = Future(executor=executor)
-
-        def run() -> None:
-            try:
-                future.set_result(work())
-            except BaseException as error:
-                if self.context.ok():  # else nobody waits for it any more
-                    future.set_exception(error)
-            if executor is not None:
-                executor.wake()
-
-        thread = threading.Thread(target=run, name="aside", daemon=True)
-        self._aside = [*(other for other in self._aside if other.is_alive()), thread]
-        thread.start()
-        return future
-
-    def serve_aside(self, name: str, work: Callable[[], tuple[bool, str]]) -> None:
-        """A service of std_srvs/Trigger: ``work`` is done `aside`, and says whether it could be, and what to know.
-
-        A call that comes while another one is answered is refused, and so is one that comes before the service has
-        rested `REST` times as long as that took: whoever calls all the time holds up little of the rest.
-        """
-        in_hand, rested_s = threading.Lock(), 0.0
-
-        async def answer(_: Any, response: Any) -> Any:
-            nonlocal rested_s
-            begun_s = time.monotonic()
-            if begun_s < rested_s:
-                response.success = False
-                response.message = f"{name}: call again in {rested_s - begun_s:.1f} s: an earlier call is just done"
-                return response
-            if not in_hand.acquire(blocking=False):
-                response.success, response.message = False, f"{name}: call again: an earlier call is not done yet"
-                return response
-            try:
-                response.success, response.message = await self.aside(work)
-            finally:
-                rested_s = time.monotonic() + REST * (time.monotonic() - begun_s)
-                in_hand.release()
-            return response
-
-        self.create_service(Trigger, name, answer, callback_group=self.apart)
-
-    def serve_enable(self, inputs: str) -> None:
-        """``~/enable`` of std_srvs/SetBool: whether ``inputs`` are used, as ``is_enabled``; a warning while not."""
-
-        def answer(request: Any, response: Any) -> Any:
-            self.is_enabled, response.success = request.data, True
-            response.message = "enabled" if request.data else f"{inputs} are dropped as disabled"
-            self.get_logger().warning(f"~/enable: {response.message}")
-            return response
-
-        self.create_service(SetBool, "~/enable", answer)
-
-    def end_aside(self) -> None:
-        """Wait for what is done `aside`."""
-        for thread in self._aside:
-            thread.join()
-
     # Diagnostics, parameters, the end
 
     def _report(self) -> None:
@@ -415,10 +341,6 @@ class NodeBase(ManagedNode):
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
         """One by one, each as in `set_parameters_atomically`."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
-
-    def is_busy(self) -> bool:
-        """Whether something is done `aside`."""
-        return any(thread.is_alive() for thread in self._aside)
 
     def end_work(self) -> None:
         """End the worker."""

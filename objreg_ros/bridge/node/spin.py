@@ -11,8 +11,9 @@ from collections.abc import Callable, Sequence
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from objreg_ros.bridge.node import profile, shared_memory
-from objreg_ros.bridge.node.lifetime import (
+from objreg_ros.bridge.node.node_base import NodeBase
+from objreg_ros.bridge.process import profile, shared_memory
+from objreg_ros.bridge.process.lifetime import (
     Abandoned,
     FirstSignal,
     begin,
@@ -21,7 +22,6 @@ from objreg_ros.bridge.node.lifetime import (
     share_arenas,
     shutdown_as_interrupt,
 )
-from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.terminal import protect_terminal
 
 

@@ -40,7 +40,7 @@ class Watch:
     def silent(self) -> dict[str, str]:
         """input → what is wrong and what to do, for each input that has been silent for a period."""
         now = self._clock()
-        late = {name: now - heard_at for name, heard_at in self._received_at.items()}
+        late = {name: now - received_at for name, received_at in self._received_at.items()}
         return {name: self._advice(name, seconds) for name, seconds in late.items() if seconds >= self._period_s}
 
     def _advice(self, name: str, seconds: float) -> str:

@@ -29,17 +29,17 @@ class Acknowledgements:
             raise ValueError(f"expected one of {', '.join(ORDER)}, got {', '.join(sorted(nodes)) or 'no nodes'}")
         self.outcomes: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self._followed = {IMAGE: DETECTOR in self.nodes, DEPTH: self.nodes[-1] != DETECTOR}
-        self._on_their_way: dict[str, Counter[int]] = {IMAGE: Counter(), DEPTH: Counter()}
+        self._in_flight: dict[str, Counter[int]] = {IMAGE: Counter(), DEPTH: Counter()}
 
     def waiting(self, kind: str, after_ns: int | None = None) -> int:
         """How many images or depths are in flight, of all or of those later than a stamp."""
-        stamps = self._on_their_way[kind].elements()
+        stamps = self._in_flight[kind].elements()
         return sum(after_ns is None or stamp > after_ns for stamp in stamps)
 
     def send(self, kind: str, stamp_ns: int) -> None:
         """An image or a depth was sent."""
         if self._followed[kind]:
-            self._on_their_way[kind][stamp_ns] += 1
+            self._in_flight[kind][stamp_ns] += 1
 
     def receive(self, text: str, stamp_ns: int) -> None:
         """An acknowledgement came; one that says nothing we know is left aside."""
@@ -49,12 +49,12 @@ class Acknowledgements:
         self.outcomes[node][verdict] += 1
         kind = IMAGE if node == DETECTOR else DEPTH
         ends = node in (DETECTOR, self.nodes[-1]) or verdict.startswith("dropped")
-        if ends and self._on_their_way[kind][stamp_ns] > 0:
-            self._on_their_way[kind][stamp_ns] -= 1
+        if ends and self._in_flight[kind][stamp_ns] > 0:
+            self._in_flight[kind][stamp_ns] -= 1
 
     def give_up(self) -> list[int]:
         """Wait no longer for anything; the stamps of what never came to its end."""
-        lost = sorted(stamp for kind in self._on_their_way.values() for stamp in kind.elements())
-        for kind in self._on_their_way.values():
+        lost = sorted(stamp for kind in self._in_flight.values() for stamp in kind.elements())
+        for kind in self._in_flight.values():
             kind.clear()
         return lost

@@ -19,7 +19,7 @@ from visualization_msgs.msg import MarkerArray
 from objreg_ros.bridge.messages import closures_msg, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.diagnostics import REJECTED, refusals
-from objreg_ros.data import LoopClosure, Observation, Rejected
+from objreg_ros.data.closures import LoopClosure, Observation, Rejected
 
 
 class Announcements:
@@ -81,7 +81,7 @@ class Announcements:
         """Show the scene in RViz."""
         self._markers.publish(scene)
 
-    def told(self) -> dict[str, object]:
+    def diagnostics(self) -> dict[str, object]:
         """For diagnostics: constraints, refusals by reason, the last refusal of each, and what moved last."""
         confirmed = {"constraints": self._published.total(), "constraints confirmed by others": self._published[True]}
         refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from objreg_ros.data import JUMP_NS
+from objreg_ros.data.frames import JUMP_NS
 
 AHEAD_NS = 60_000_000_000  # a stamp that leaps so far ahead is believed once the next one follows it
 PERIODS = 2  # of a stream have to pass until its silence speaks for what is held

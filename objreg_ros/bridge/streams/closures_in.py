@@ -15,10 +15,10 @@ from typing import Any
 
 from nav_msgs.msg import Odometry
 
-from objreg_ros.bridge.messages import closures_msg, from_msg
+from objreg_ros.bridge.messages import closures_msg, from_msg, headers
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.node_base import NodeBase
-from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same, robot_of
+from objreg_ros.data.closures import LoopClosure, Moments, Robots, may_be_same, robot_of
 
 MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twice
 
@@ -110,7 +110,7 @@ class ClosuresIn:
     def _receive(self, topic: str, message: Any, decode: Callable[[Any], LoopClosure]) -> LoopClosure | None:
         closure = self._node.read_aside(topic, decode, message)
         if closure is None:
-            stamp_ns = from_msg.stamp_ns(message)
+            stamp_ns = headers.stamp_ns(message)
             self._node.accept(stamp_ns)
             self._node.drop(stamp_ns, f"malformed_{topic}")
         elif self._is_known(closure):
@@ -125,5 +125,5 @@ class ClosuresIn:
 
 
 def _whole(message: Any) -> LoopClosure:
-    from_msg.bounded(message.id, "id")
+    headers.bounded(message.id, "id")
     return closures_msg.read_loop_closure(message)

@@ -19,11 +19,13 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import from_msg, headers
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import REJECTED, balance_of, refusal_of
-from objreg_ros.data import Detections, LoopClosure, ObjectCloud, Rejected
+from objreg_ros.data.closures import LoopClosure, Rejected
+from objreg_ros.data.frames import ObjectCloud
+from objreg_ros.data.images import Detections
 
 RECENT = 100  # detections that wait for their objects
 
@@ -105,7 +107,7 @@ class Collector(Node):
 
     def _on_objects(self, message: Any) -> None:
         """Keep the frame with the most objects, and of those the latest."""
-        stamp_ns = from_msg.stamp_ns(message)
+        stamp_ns = headers.stamp_ns(message)
         objects, _ = from_msg.objects(message, self._names)
         middles = [[item.label, np.median(item.xyz, axis=0).astype(float).round(4).tolist()] for item in objects]
         self._glimpse(stamp_ns)["objects"] = middles

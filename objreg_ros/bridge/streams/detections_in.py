@@ -12,19 +12,19 @@ from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros.bridge.camera import lenses
-from objreg_ros.bridge.messages import from_msg, to_msg, vision_from_msg
+from objreg_ros.bridge.messages import from_msg, headers, to_msg, vision_from_msg
 from objreg_ros.bridge.messages.label_table import LabelTable
 from objreg_ros.bridge.messages.layout import table
 from objreg_ros.bridge.messages.vision_to_msg import Detection2DArray, LabelInfo
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.intra_process import Surplus
+from objreg_ros.bridge.process.intra_process import Surplus
 from objreg_ros.bridge.streams.sync import Drop, Match
 from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
-from objreg_ros.data import DepthImage, Detections, PointCloud
+from objreg_ros.data.images import DepthImage, Detections, PointCloud
 
 TABLE, BOXES, MASKS = {"detections_table": PointCloud2}, {"detections_in": Detection2DArray}, {"masks": Image}
 SOURCES = {"auto": {**TABLE, **BOXES, **MASKS}, "table": TABLE, "vision_msgs": BOXES, "masks": MASKS}
-HEARD_S = 1.0  # most that a new name waits until every subscriber has it
+RECEIVED_S = 1.0  # most that a new name waits until every subscriber has it
 
 
 class Asked(NamedTuple):
@@ -81,7 +81,7 @@ class DetectionsIn:
         if topic not in TABLE:
             self._node.feed("labels", 0, self._labels.names)  # it needs no table, so nothing waits for one
         surplus = isinstance(message, Surplus) or (topic in TABLE and _is_surplus(message))
-        self._node.feed("detections", from_msg.stamp_ns(message), Drop.SURPLUS if surplus else message)
+        self._node.feed("detections", headers.stamp_ns(message), Drop.SURPLUS if surplus else message)
 
     # Read
 
@@ -113,7 +113,7 @@ class DetectionsIn:
             self._out = self._node.create_publisher(String, "labels", qos.latched())
         self._shared = names
         self._out.publish(to_msg.labels(names))
-        self._out.wait_for_all_acked(Duration(seconds=HEARD_S))
+        self._out.wait_for_all_acked(Duration(seconds=RECEIVED_S))
 
 
 def _is_surplus(message: Any) -> bool:

@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CompressedImage
 
 from objreg_ros import limits
-from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_ros.bridge.messages import headers, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.streams.fair_queue import FairQueue
@@ -86,12 +86,12 @@ class Exchanging:
         def received(message: Any) -> None:
             packed = self._node.read_aside(topic, lambda sent: _bytes_of(self._key.check(full, sent)), message)
             if packed is not None:
-                receive(from_msg.stamp_ns(message), packed)
+                receive(headers.stamp_ns(message), packed)
 
         self._node.listen(CompressedImage, topic, received, profile)
         return self._node.create_publisher(CompressedImage, topic, profile)
 
-    def tell(self, stamp_ns: int, summary: bytes | None) -> None:
+    def send(self, stamp_ns: int, summary: bytes | None) -> None:
         """Announce a keyframe to all others."""
         self._publish(self._summaries, stamp_ns, summary)
 
@@ -131,7 +131,7 @@ class Exchanging:
         message = CompressedImage(header=to_msg.header(stamp_ns, ""), format=FORMAT, data=data)
         publisher.publish(self._key.sign(publisher.topic_name, message))
 
-    def told(self) -> dict[str, object]:
+    def diagnostics(self) -> dict[str, object]:
         """For diagnostics: what was said and received."""
         return {f"exchange: {what}": count for what, count in sorted(self._exchange.counters.items())}
 

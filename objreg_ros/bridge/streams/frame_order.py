@@ -16,7 +16,7 @@ class _Place:
     ended: bool = False
 
 
-class Turns:
+class FrameOrder:
     """Puts frames off until those before them have ended: ``due`` is given stamp and frame id of each whose turn it is.
 
     Safe to use from the executor and the worker at once; ``due`` is called by one of them at a time, in order.

@@ -19,11 +19,12 @@ from objreg_ros.bridge.camera.camera_stream import CameraStream
 from objreg_ros.bridge.camera.mount import Body, Mount, nameless_body
 from objreg_ros.bridge.camera.transforms import is_installed, receive_frames
 from objreg_ros.bridge.camera.travel import Travel
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import from_msg, headers, motion_from_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.streams.sync import Match, Need, Stream
 from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
-from objreg_ros.data import Array, Frame
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame
 from objreg_ros.plausibility.finding import Finding
 
 # By which odometry may come. Whose pose one without a child_frame_id is, the name behind all remaps says.
@@ -44,13 +45,13 @@ class FramesNode(SynchronisedNode):
         self.odom_frame = "odom"
         self._camera: str | None = None  # the frame_id of the last frame
 
-    def listen_to_frames(self, told: Array | None, odom_slop_ns: int) -> None:
-        """Subscribe. ``told`` is the pose of the camera on the body of odometry; if None, /tf_static and /tf give it.
+    def listen_to_frames(self, given: Array | None, odom_slop_ns: int) -> None:
+        """Subscribe. ``given`` is the pose of the camera on the body of odometry; if None, /tf_static and /tf give it.
 
         Odometry is that of a topic, and that of /tf while no topic of it has a publisher.
         """
         tree = receive_frames(self, then=self._on_tf)
-        self._mount = Mount(told, tree, self.get_logger().info)
+        self._mount = Mount(given, tree, self.get_logger().info)
         self._stream = CameraStream(self._mount, self.get_logger().info)
         self._travel = Travel(tree)
         self._by_topic = False
@@ -90,7 +91,7 @@ class FramesNode(SynchronisedNode):
         return self._names.get(robot) or self._names.get("", {})
 
     def _on_odom(self, message: Any, body: Body = Body.BASE) -> None:
-        odometry = self.read_aside("odom", from_msg.odometry, message)
+        odometry = self.read_aside("odom", motion_from_msg.odometry, message)
         if odometry is not None:
             self._by_topic, self._mount.nameless = True, body
             self._stream.take_odometry(odometry)
@@ -111,14 +112,14 @@ class FramesNode(SynchronisedNode):
 
     def _receive(self, topic: str) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
-            self._travel.camera = from_msg.frame_id(message).lstrip("/")
-            self.feed(topic, from_msg.stamp_ns(message), message)
+            self._travel.camera = headers.frame_id(message).lstrip("/")
+            self.feed(topic, headers.stamp_ns(message), message)
 
-        return receive if topic == "objects" else lambda message: self.feed(topic, from_msg.stamp_ns(message), message)
+        return receive if topic == "objects" else lambda message: self.feed(topic, headers.stamp_ns(message), message)
 
     def frame_of(self, match: Match) -> tuple[Frame, Array | None]:
         """A frame, and where the camera sits on the body of its odometry; `DroppedError` if it breaks its contract."""
-        odom, camera = match["odom"], from_msg.frame_id(match["objects"])
+        odom, camera = match["odom"], headers.frame_id(match["objects"])
         self._watch_camera(camera)
         self.odom_frame = odom[0].frame_id if odom else self.odom_frame
         frame = match["objects"]

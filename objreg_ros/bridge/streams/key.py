@@ -19,7 +19,7 @@ from typing import Any
 from sensor_msgs.msg import CompressedImage
 
 from objreg_ros import limits
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import headers
 
 LEAST, MOST = 16, 4096  # bytes of a key
 SIGNED = " hmac-sha256"  # behind the format
@@ -58,7 +58,7 @@ class Key:
         return _with(message, form, body)
 
     def _signature(self, topic: str, message: Any, form: str, data: Any) -> bytes:
-        header = [topic, from_msg.stamp_ns(message), message.header.frame_id, form]
+        header = [topic, headers.stamp_ns(message), message.header.frame_id, form]
         return hmac.digest(self._secret, json.dumps(header).encode() + b"\n" + bytes(data), "sha256")
 
 

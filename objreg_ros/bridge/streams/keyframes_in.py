@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import String
 
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import headers
 from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe, read_keyframe
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import Key
-from objreg_ros.data import framed
+from objreg_ros.data.closures import framed
 
 
 class FromRobot(NamedTuple):
@@ -67,7 +67,7 @@ class KeyframesIn:
         self._node.expect(topic, topic)
 
     def _receive(self, robot: str, topic: str, message: Any) -> None:
-        full, stamp_ns = self._node.resolve_topic_name(topic), from_msg.stamp_ns(message)
+        full, stamp_ns = self._node.resolve_topic_name(topic), headers.stamp_ns(message)
         sent = self._node.read_aside("keyframes", lambda one: read_keyframe(self._key.check(full, one)), message)
         self._node.accept(stamp_ns)
         if sent is None:
@@ -92,7 +92,7 @@ class KeyframesIn:
         """One more keyframe of a robot of which this became."""
         self._counts[robot, what] += 1
 
-    def told(self) -> dict[str, object]:
+    def diagnostics(self) -> dict[str, object]:
         """For diagnostics: what became of the keyframes of each robot."""
         return {
             f"{robot}: keyframes {what}" if robot else f"keyframes {what}": count

@@ -16,7 +16,7 @@ from visualization_msgs.msg import MarkerArray
 
 from objreg_ros.bridge.messages import markers, to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 
 try:
     from tf2_ros import TransformBroadcaster

@@ -18,7 +18,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
-from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_ros.bridge.messages import headers, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.streams.acknowledgements import DEPTH, IMAGE, ORDER, Acknowledgements
 
@@ -130,7 +130,7 @@ class Player(Node):
     def _receive(self, acknowledgement: Header) -> None:
         self._received = time.monotonic()
         if self._acknowledgements is not None:
-            self._acknowledgements.receive(acknowledgement.frame_id, from_msg.stamp_ns(acknowledgement))
+            self._acknowledgements.receive(acknowledgement.frame_id, headers.stamp_ns(acknowledgement))
 
     # Play
 
@@ -157,7 +157,7 @@ class Player(Node):
         newest_image_ns = 0
         for item in items:
             if item.kind:
-                self._wait_for_room(acknowledgements, item.kind, patience)
+                self._wait_for_space(acknowledgements, item.kind, patience)
                 acknowledgements.send(item.kind, item.header_ns)
             if item.kind == IMAGE:
                 newest_image_ns = item.header_ns
@@ -165,7 +165,7 @@ class Player(Node):
             on_item(item)
         self._wait_for_end(acknowledgements, newest_image_ns, patience)
 
-    def _wait_for_room(self, acknowledgements: Acknowledgements, kind: str, patience: float) -> None:
+    def _wait_for_space(self, acknowledgements: Acknowledgements, kind: str, patience: float) -> None:
         self._received = time.monotonic()
         while acknowledgements.waiting(kind) > sum(self._silence > seconds for seconds in SILENCE_S):
             self._attend(acknowledgements, patience)

@@ -17,8 +17,9 @@ from std_srvs.srv import Trigger
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.node_base import NodeBase
-from objreg_ros.bridge.node.params import RelocalisedParams
-from objreg_ros.data import Array, Relocalised
+from objreg_ros.bridge.streams.params import RelocalisedParams
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Relocalised
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, turned_about
 
 try:

@@ -15,7 +15,7 @@ from enum import Enum
 from typing import Any
 
 from objreg_ros.bridge.streams.clock_monitor import ClockMonitor
-from objreg_ros.data import JUMP_NS
+from objreg_ros.data.frames import JUMP_NS
 
 
 class Need(Enum):
@@ -105,10 +105,10 @@ class Queue:
     received: int = 0
     matched: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
-    course: ClockMonitor[Any] = field(init=False)
+    clock: ClockMonitor[Any] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.course = ClockMonitor(lambda stamp_ns, payload: self._let_go(Item(stamp_ns, payload), Drop.ODD_STAMP))
+        self.clock = ClockMonitor(lambda stamp_ns, payload: self._let_go(Item(stamp_ns, payload), Drop.ODD_STAMP))
 
     @property
     def crowded(self) -> bool:
@@ -122,7 +122,7 @@ class Queue:
     @property
     def waiting(self) -> int:
         """Items that no match has used yet."""
-        return sum(not item.used for item in self.items) + self.course.holding
+        return sum(not item.used for item in self.items) + self.clock.holding
 
     def nearest(self, stamp_ns: int) -> Item | None:
         """The item nearest to a time within the slop; None if there is none. The earlier of two that are as near."""
@@ -224,7 +224,7 @@ class Synchroniser:
         if queue.stream.need is Need.LATCHED:
             queue.latched, queue.matched = payload, queue.matched + 1
             return self._matches()
-        admitted = queue.course.admit(stamp_ns, payload)
+        admitted = queue.clock.admit(stamp_ns, payload)
         return [match for item in admitted for match in self._take(queue, *item)]
 
     def _take(self, queue: Queue, stamp_ns: int, payload: Any) -> list[Match]:
@@ -235,11 +235,11 @@ class Synchroniser:
             self._forget_after(stamp_ns)
         queue.drop_after(stamp_ns)  # another stream's jump may have left what lies in the future of this one's
         queue.receive(Item(stamp_ns, payload))
-        return [*self._matches(), *self._make_room(queue)]
+        return [*self._matches(), *self._make_space(queue)]
 
     def believe(self, passed_ns: int) -> list[Match]:
         """The matches by what has leapt in time alone and is believed: see `ClockMonitor.believe`."""
-        found = [(queue, item) for queue in self._partners_first for item in queue.course.believe(passed_ns)]
+        found = [(queue, item) for queue in self._partners_first for item in queue.clock.believe(passed_ns)]
         return [match for queue, item in found for match in self._take(queue, *item)]
 
     def wait_no_longer(self) -> list[Match]:
@@ -254,7 +254,7 @@ class Synchroniser:
 
     def flush(self) -> list[Match]:
         """The matches that are still possible when nothing more will come; the rest is dropped as unmatched."""
-        ended = [(queue, item) for queue in self._partners_first for item in queue.course.end()]
+        ended = [(queue, item) for queue in self._partners_first for item in queue.clock.end()]
         found = [match for queue, item in ended for match in self._take(queue, *item)]
         while self._reference.items:
             found += self._resolve(self._reference.items[0])
@@ -354,7 +354,7 @@ class Synchroniser:
             if queue.stream.need is Need.REQUIRED:
                 queue.items.popleft()
 
-    def _make_room(self, queue: Queue) -> list[Match]:
+    def _make_space(self, queue: Queue) -> list[Match]:
         """Keep a queue within bounds: the oldest reference item goes as it is, the oldest of others is dropped."""
         found: list[Match] = []
         while queue.crowded:

@@ -11,7 +11,7 @@ import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass, field
 
-from objreg_ros.data import robot_of
+from objreg_ros.data.closures import robot_of
 from objreg_ros.registrar.summary import MOST_RUNS, Summary
 
 MOST_JUMP = 10_000  # keyframes between two summaries of a peer: hours

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Alignment, Array
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Alignment
 from objreg_ros.geometry import rotation_angle, skew
 from objreg_ros.registration.candidate import Candidate
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import RegistrationParams
 
 SCALE_GROWTH = 2.4  # of the logarithm of the scale for each 1 that V is lower
 REFERENCE_RMSE_M = 0.0065  # of the residuals at which the scale holds; it grows in proportion
@@ -26,7 +27,7 @@ DEGENERATE_SIGMA_DEG = 60.0  # about a degenerate axis
 NEAREST = 0.3  # m: nothing is seen nearer
 
 
-def covariance_of(candidate: Candidate, params: RegistrarParams) -> Array:
+def covariance_of(candidate: Candidate, params: RegistrationParams) -> Array:
     """(6, 6) float64 [tx ty tz rx ry rz] of ``T_target_source`` in the target frame, positive definite."""
     alignment, disliked = candidate.alignment, 1.0 - candidate.verification.score
     doubt = float(np.exp(SCALE_GROWTH * disliked)) * alignment.rmse / REFERENCE_RMSE_M

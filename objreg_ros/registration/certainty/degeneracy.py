@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import skew
 from objreg_ros.registration.certainty.sandwich import systematic_depth_error_of_step
 from objreg_ros.registration.prepare.prepared import Prepared

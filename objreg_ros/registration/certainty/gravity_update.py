@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, rotation_from_vector, skew
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.sensor import MANY_VIEWS_DEG

@@ -13,7 +13,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import transform
 from objreg_ros.registration.certainty.perturbation import PerturbedScore, perturbed, square_grid, turned_about
 from objreg_ros.registration.prepare.prepared import Prepared

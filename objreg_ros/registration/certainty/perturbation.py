@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.view_score import PHOTOMETRIC_POINTS, count_both_ways, score_counts, score_sharply

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.kernels.closest_points import Surface
 from objreg_ros.registration.refine.batch_icp import REACHES_M, pair
 from objreg_ros.sensor import DEPTH_WARP, depth_sigma

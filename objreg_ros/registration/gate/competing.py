@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.gate.refusal import Refusal
 
 LEAST_MARGIN = 0.1  # of the total score: a pose 48 cm off led by 0.02, three objects matched, and the print agreed

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.candidate import KeypointAgreement
 from objreg_ros.registration.gate.refusal import Refusal
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.gate.refusal import Refusal
 
 SIGMAS = 3.5  # deviations of both gravities together: one right pose of 450 is farther off

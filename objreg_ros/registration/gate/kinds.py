@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of, spread_of, worst_translation
 from objreg_ros.registration.gate.objects import counted, independent
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import RegistrationParams
 
 
 class Kind(NamedTuple):
@@ -28,10 +28,10 @@ class Kind(NamedTuple):
     knots: tuple[float, ...]  # ascending readings between which the weight is linear; it is constant beyond
     rises: bool  # whether more of it supports a pose
     reason: Reason  # of a refusal for want of it
-    words: str  # what a refusal calls it
+    phrase: str  # what a refusal calls it
 
 
-AS_CALIBRATED = RegistrarParams(covariance_calibration=0.01)  # a camera's own; a user's changes no verdict
+AS_CALIBRATED = RegistrationParams(covariance_calibration=0.01)  # a camera's own; a user's changes no verdict
 
 
 def _position_sigma(one: Candidate) -> float:

@@ -48,4 +48,4 @@ def check(candidate: Candidate, least_odds: float) -> Refusal | None:
     worst = max(lacking, key=lambda name: lacking[name])
     reading = readings[worst]
     value = "unknown" if reading is None else f"{reading:.3g}"
-    return KINDS[worst].reason, f"odds {10.0**found:.2g} < {least_odds:g}, most for {KINDS[worst].words} {value}"
+    return KINDS[worst].reason, f"odds {10.0**found:.2g} < {least_odds:g}, most for {KINDS[worst].phrase} {value}"

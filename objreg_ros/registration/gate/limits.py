@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from objreg_ros.registration.gate import competing, free_space, gravity, likelihood, objects, odometry, surroundings
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import RegistrationParams
 
 
 class Limits(NamedTuple):
@@ -25,6 +25,6 @@ class Limits(NamedTuple):
 LIMITS = Limits()
 
 
-def limits_of(params: RegistrarParams) -> Limits:
+def limits_of(params: RegistrationParams) -> Limits:
     """The limits with those that a user set."""
     return LIMITS._replace(odds=params.least_odds, translation_m=params.max_translation)

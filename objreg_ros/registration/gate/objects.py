@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from objreg_ros.data import UNNAMED, Reason
+from objreg_ros.data.closures import Reason
+from objreg_ros.data.frames import UNNAMED
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate.refusal import Refusal
 

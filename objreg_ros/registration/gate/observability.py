@@ -7,7 +7,7 @@ view score falls where the pose is moved.
 
 from __future__ import annotations
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.gate.refusal import Refusal
 
 DIRECTIONS = 6  # of a pose

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array, Reason
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Reason
 from objreg_ros.geometry import pose_error
 from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.propose.prior import Prior

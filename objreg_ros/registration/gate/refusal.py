@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 
 Refusal = tuple[Reason, str]
 """The reason, and the numbers behind it: got and expected."""

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
 from objreg_ros.registration.prepare.normals import view_normals
 
 ENLARGED = 1.5  # times, before SIFT doubles the picture once more

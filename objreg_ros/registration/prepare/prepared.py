@@ -12,11 +12,11 @@ from typing import TypeVar, overload
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import RegistrationParams
 from objreg_ros.registration.prepare.fpfh import Features, describe, salient
 from objreg_ros.registration.prepare.keypoints import KeypointMatches, Keypoints, find_keypoints, match_keypoints
 from objreg_ros.registration.prepare.normals import view_normals
@@ -132,7 +132,7 @@ class Pair:
         return self._matched[0]
 
 
-def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
+def prepare(keyframe: Keyframe, params: RegistrationParams) -> Prepared:
     """Everything about one keyframe that does not depend on its partner.
 
     Surface and features are made beside the rest: they let go of the interpreter. What is derived of single objects is
@@ -172,7 +172,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
         )
 
 
-def seen(keyframe: Keyframe, params: RegistrarParams) -> tuple[Array, Array]:
+def seen(keyframe: Keyframe, params: RegistrationParams) -> tuple[Array, Array]:
     """Points (N, 3) and normals (N, 3) of the whole view and of the context beyond it.
 
     The whole view, not only what is near the objects: walls and furniture hold a pose that a table would let slide.
@@ -213,7 +213,7 @@ def _shuffled(xyz: Array, normals: Array, seed: int) -> dict[str, Array]:
 class PreparedCache:
     """The last ``size`` keyframes that were made ready; for several threads."""
 
-    def __init__(self, params: RegistrarParams, size: int = PREPARED) -> None:
+    def __init__(self, params: RegistrationParams, size: int = PREPARED) -> None:
         self._params = params
         self._size = size
         self._lock = threading.Lock()

@@ -13,7 +13,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, Intrinsics, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.registration.kernels.projection import project
 from objreg_ros.registration.keyframe import KeyObject
 from objreg_ros.sensor import depth_noise

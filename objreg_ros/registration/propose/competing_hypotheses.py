@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import transform
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.observability import SEARCH_STEP_M, SEARCH_STEPS

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from objreg_ros.data import Alignment
+from objreg_ros.data.closures import Alignment
 from objreg_ros.registration.candidate import Candidate, Score, Verification
 from objreg_ros.registration.certainty.covariance import spread_of, worst_translation
 from objreg_ros.registration.certainty.degeneracy import systematic_depth_error

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 from scipy.optimize import minimize
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.free_space import OCCLUDED, SEEN, VIOLATIONS
 from objreg_ros.registration.score.total_score import SILHOUETTE_WEIGHT_UPRIGHT, VIOLATION_WEIGHT_UPRIGHT

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.data import UNNAMED, Array
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import UNNAMED
 from objreg_ros.geometry import pose, rotation_between, rotation_from_vector
 from objreg_ros.registration.candidate import Score
 from objreg_ros.registration.prepare.fpfh import match

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.registration.prepare.keypoints import KeypointMatches
 from objreg_ros.registration.prepare.prepared import Pair

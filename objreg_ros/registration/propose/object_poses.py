@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import transform
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.prepare.prepared import Prepared

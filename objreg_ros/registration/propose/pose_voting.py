@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.kernels.same_pose import VOTES_ANGLE, VOTES_TOLERANCES, Nearness, distinct
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import RegistrationParams
 
 TIGHT_TRANSLATION_M = 0.2  # odometry whose position is less certain proposes no pose: it would start in another basin
 TIGHT_ROTATION_DEG = 6.0  # odometry whose rotation is less certain proposes no pose
@@ -32,7 +32,7 @@ class Prior:
         return self.translation_m <= TIGHT_TRANSLATION_M and self.rotation_deg <= TIGHT_ROTATION_DEG
 
 
-def expect(source: Keyframe, target: Keyframe, params: RegistrarParams) -> Prior | None:
+def expect(source: Keyframe, target: Keyframe, params: RegistrationParams) -> Prior | None:
     """What is expected between two keyframes: the less certain, the longer the path between them was.
 
     None where the two are of different sessions.

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Alignment, Array
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import Alignment
 from objreg_ros.geometry import transform
 from objreg_ros.registration.certainty.degeneracy import about_camera, degenerate_directions
 from objreg_ros.registration.certainty.observability import split_directions

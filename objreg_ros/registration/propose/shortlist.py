@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.candidate import Score
 from objreg_ros.registration.certainty.gravity_update import gravity_error
 from objreg_ros.registration.kernels.same_pose import (

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.kernels.closest_points import Surface
 from objreg_ros.registration.kernels.least_squares import add_normal_equations, move, solve
 from objreg_ros.registration.kernels.projection import FAST, INDEX, moved

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.kernels.least_squares import add_normal_equations, invert, move, solve
 from objreg_ros.registration.kernels.projection import FAST, between, nearest, project, visible
 from objreg_ros.registration.prepare.prepared import Prepared

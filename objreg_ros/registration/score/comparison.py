@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.candidate import Verification
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.object_matches import Pairs, score_matched_silhouettes

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, transform
 from objreg_ros.registration.candidate import KeypointAgreement
 from objreg_ros.registration.kernels.same_pose import AGREEING, near

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, transform
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.prepare.prepared import Prepared

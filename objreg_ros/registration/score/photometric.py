@@ -13,7 +13,7 @@ import cv2
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse
 from objreg_ros.registration.kernels.projection import FAST, project, spread, visible
 from objreg_ros.registration.prepare.views import SHADELESS, SMOOTH, Sight

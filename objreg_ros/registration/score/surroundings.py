@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.candidate import Verification
 from objreg_ros.registration.prepare.views import SHADELESS, Band, Print, Sight, pixels_of
 from objreg_ros.registration.score.view_score import verify

@@ -12,7 +12,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.kernels.least_squares import invert
 from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.prepare.prepared import Prepared

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, inverses
 from objreg_ros.registration.candidate import Verification
 from objreg_ros.registration.prepare.views import Sight

@@ -12,7 +12,8 @@ import cv2
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, PointFlag
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import PointFlag
 from objreg_ros.geometry import pose
 from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
 from objreg_ros.registration.kernels.projection import FAST

@@ -14,7 +14,8 @@ import cv2
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
 from objreg_ros.sensor import silhouette_tolerance
 
 BESIDE, INSIDE, RIM = 0, 1, 2  # the values of a silhouette's mask

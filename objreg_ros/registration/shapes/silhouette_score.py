@@ -11,7 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.kernels.projection import FAST, INDEX, LEAST_DEPTH, project
 from objreg_ros.registration.shapes.shape import Shape
 from objreg_ros.registration.shapes.silhouette import INSIDE, RIM

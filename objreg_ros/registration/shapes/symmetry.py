@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array, ObjectCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.registration.shapes.shape import Shape
 from objreg_ros.registration.shapes.silhouette_score import COUNTS, VIOLATIONS, ask
 

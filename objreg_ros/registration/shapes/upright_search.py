@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.shapes.shape import Shape, upright_motion, upright_pose
 from objreg_ros.registration.shapes.silhouette_score import climb, two_way, weights_of

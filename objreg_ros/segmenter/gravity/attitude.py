@@ -13,7 +13,7 @@ from collections import Counter
 
 import numpy as np
 
-from objreg_ros.data import JUMP_NS, FeltGravity, ImuSample
+from objreg_ros.data.frames import JUMP_NS, FeltGravity, ImuSample
 
 G = 9.80665  # m/s^2
 NORM_SLACK = 0.15  # m/s^2 off G that the scale of a cheap accelerometer explains

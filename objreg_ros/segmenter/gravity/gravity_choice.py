@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.sensor import gravity_confidence, gravity_sigma_deg
 
 APART = 3.0  # deviations of both together: beyond, the picture took for level what is not

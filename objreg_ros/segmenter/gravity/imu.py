@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from objreg_ros.data import Array, FeltGravity
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import FeltGravity
 from objreg_ros.segmenter.gravity.attitude import AttitudeFilter
 
 FindPose = Callable[[str, str], Array | None]  # (camera's frame, IMU's frame) -> T_camera_imu, None where unknown

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.sensor import CONFIDENCE
 
 CANDIDATES = 64

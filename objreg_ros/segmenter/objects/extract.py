@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, PointFlag
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import PointFlag
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.surface.cells import EXACT, MIN_COSINE, Surface
 

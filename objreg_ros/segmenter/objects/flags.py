@@ -7,7 +7,9 @@ import cv2
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, PointFlag
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import PointFlag
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.extract import Pixels
 from objreg_ros.segmenter.surface.cells import EXACT, Surface, Window
 from objreg_ros.segmenter.surface.support import solve_symmetric

@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, PointFlag
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import PointFlag
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.objects.extract import Pixels, colours, extract
 from objreg_ros.segmenter.objects.flags import whole_flags

@@ -9,7 +9,8 @@ import threading
 
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.objects.extract import Pixels
 from objreg_ros.segmenter.params import SegmenterParams

@@ -14,7 +14,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, PointFlag
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import PointFlag
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.boxes import Box, is_empty
 from objreg_ros.segmenter.objects.extract import Pixels, extract
 from objreg_ros.segmenter.objects.flags import whole_flags
@@ -46,7 +48,7 @@ SUMS = 12
 CELLS, DEPTH, TAKEN, SHOWN, HIDDEN, GOES_ON, OUTSIDE, STANDS, UNKNOWN, HEIGHT, BASE, BASES = range(SUMS)
 
 
-class Thing(NamedTuple):
+class UnnamedPixels(NamedTuple):
     """An unnamed object: its ``pixels``, the ``flags`` of all of them, and which share of its border is its ``own``."""
 
     pixels: Pixels
@@ -72,9 +74,9 @@ class Part(NamedTuple):
     stands: bool
 
 
-def find_things(
+def find_unnamed(
     image: DepthImage, ground: Ground, taken: Array, people: Sequence[Box], params: SegmenterParams
-) -> list[Thing]:
+) -> list[UnnamedPixels]:
     """At most MOST unnamed objects, the most certain first.
 
     ``taken (h, w) bool`` are the cells of the whole frame that are of a named object, ``people`` the boxes of persons
@@ -86,16 +88,16 @@ def find_things(
     level = _level(ground)
     whole, count = connect(grid.depth, (grid.depth > 0) & ~level, jump)
     around = _Surroundings(level, taken, [box for box in people if not is_empty(box)])
-    found = _things(whole, count, around, ground, jump)
+    found = _unnamed(whole, count, around, ground, jump)
     done = level.copy()
     for one in found:  # what is an object as a whole is not parted
         left, top, right, bottom = one.extent
         done[top:bottom, left:right] |= one.chosen
     parts, count = split(grid.depth, done, find_seams(grid, params.crease, jump), jump, LEAST_CELLS, GROWTH)
-    found += _things(parts, count, around, ground, jump)
+    found += _unnamed(parts, count, around, ground, jump)
     found.sort(key=lambda one: -one.own * np.sqrt(one.chosen.sum()))
-    things = (_cut(image, grid, one, params) for one in found[: 2 * MOST])
-    return [thing for thing in things if thing is not None][:MOST]
+    placed = (_cut(image, grid, one, params) for one in found[: 2 * MOST])
+    return [thing for thing in placed if thing is not None][:MOST]
 
 
 def _level(ground: Ground) -> Array:
@@ -151,7 +153,7 @@ def _mark_level(depth, x, y, parts, count, n, offset, level):  # type: ignore[no
             level[i, j] |= near[j] & (z > 0) & (off < NEAR * (PLANE_TOLERANCE_M + PLANE_TOLERANCE_GROWTH * z * z))
 
 
-def _things(labels: Array, count: int, around: _Surroundings, ground: Ground, jump: tuple[float, float]) -> list[Part]:
+def _unnamed(labels: Array, count: int, around: _Surroundings, ground: Ground, jump: tuple[float, float]) -> list[Part]:
     """Those of the parts 1 … ``count`` of ``labels (h, w)`` that are objects."""
     grid = ground.coarse
     up = np.zeros(3, np.float32) if ground.up is None else ground.up.astype(np.float32)
@@ -256,7 +258,7 @@ def _look(labels, level, depth, x, y, up, i, j, down, right, k, z, height, jump,
     row[UNKNOWN] += 1
 
 
-def _cut(image: DepthImage, grid: Surface, one: Part, params: SegmenterParams) -> Thing | None:
+def _cut(image: DepthImage, grid: Surface, one: Part, params: SegmenterParams) -> UnnamedPixels | None:
     """The pixels of a part; None for a patch of a wall and for too few."""
     (h, w), (left, top, right, bottom) = grid.depth.shape, one.extent
     window = max(0, left - BESIDE), max(0, top - BESIDE), min(w, right + BESIDE), min(h, bottom + BESIDE)
@@ -270,4 +272,4 @@ def _cut(image: DepthImage, grid: Surface, one: Part, params: SegmenterParams) -
     flags = whole_flags(image, pixels, around, chosen, here)
     if len(pixels) < params.min_points or flags & PointFlag.WALL_LIKE:
         return None
-    return Thing(pixels, flags if one.stands else flags | PointFlag.UNSUPPORTED, one.own)
+    return UnnamedPixels(pixels, flags if one.stands else flags | PointFlag.UNSUPPORTED, one.own)

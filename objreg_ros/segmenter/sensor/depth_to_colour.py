@@ -17,7 +17,8 @@ import cv2
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.limits import MOST_DEPTH
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M, depth_noise, thinned
 
@@ -35,7 +36,7 @@ BACKGROUND = 10.0  # px of the reduced picture: gradients are measured by the me
 FIRST_SIGMA = 0.003  # rad: the first guess of the spread; small, as a lone frame with few objects is misleading
 NOISE = np.array([0.0012, 0.0008, 0.0025])  # rad: standard deviation of a frame's rotation, as in simulation
 INDEPENDENT = 0.1  # share of the depth steps that are independent: neighbours agree
-MOST_TOLD = 150.0  # independent steps of a frame, at most
+MOST_INDEPENDENT = 150.0  # independent steps of a frame, at most
 SURPRISE = 3.0  # deviations: a larger difference is clipped to this
 MEMORY = 20  # frames that are remembered
 FIRST_FRAMES = 0.2  # the weight of the first guess of the spread, in frames
@@ -46,10 +47,10 @@ SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
 
 class Offset(NamedTuple):
-    """How depth is turned against colour in a frame, ``rotation (3,)`` rad; ``told`` if the frame itself shows it."""
+    """How depth is turned against colour in a frame, ``rotation (3,)`` rad; ``shown`` if the frame itself shows it."""
 
     rotation: Array
-    told: bool
+    shown: bool
 
 
 @dataclass(slots=True, eq=False)
@@ -132,7 +133,7 @@ def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None
     rays = _steps(depth, *camera, *STEP)
     if len(rays) < LEAST_POINTS:
         return None
-    independent = min(INDEPENDENT * len(rays), MOST_TOLD)
+    independent = min(INDEPENDENT * len(rays), MOST_INDEPENDENT)
     rays = np.ascontiguousarray(rays[:: len(rays) // POINTS + 1])
     grey = cv2.cvtColor(_shrunk(image.rgb, every), cv2.COLOR_RGB2GRAY).astype(np.float32)
     weight = 1.0 / (np.sqrt(independent) * spread)  # of the prior, in units of the score

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, Detections, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
+from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.segmenter.params import SegmenterParams
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, Intrinsics, PointCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage, Intrinsics, PointCloud
 
 FAR = 65.0  # metres; 65535 mm and 65535 m both mean "no depth"
 MIN_FIT = 30  # points that a fit of the intrinsics needs

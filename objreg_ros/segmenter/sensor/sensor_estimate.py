@@ -17,7 +17,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.sensor.depth_to_colour import DepthToColour
 from objreg_ros.sensor import measured_noise, thinned
 

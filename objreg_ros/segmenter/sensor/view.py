@@ -8,7 +8,9 @@ import numba
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.data import Array, DepthImage, Intrinsics, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
+from objreg_ros.data.images import DepthImage, Intrinsics
 
 BETWEEN = np.array([-1.0, 9.0, 9.0, -1.0]) / 16.0  # of four pixels: what is between the two in the middle
 LEAST_WIDTH = 160  # px: what a narrower view holds is too coarse to locate a pose

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import Intrinsics
 
 Window = tuple[int, int, int, int]  # left, top, right, bottom in cells, half open
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.segmenter.surface.cells import EXACT, Surface, Window
 from objreg_ros.segmenter.surface.support import Ground, Plane, fit_level
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.segmenter.surface.cells import EXACT, Surface, Window
 
 ACROSS = 3  # cells over which two parts are neighbours

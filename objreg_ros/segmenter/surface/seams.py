@@ -11,7 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.segmenter.surface.cells import EXACT, REACH, Surface
 
 STEP = 0.5  # of a depth jump: the bend of the depth that is a step

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.segmenter.surface.cells import EXACT, MIN_COSINE, Surface
 from objreg_ros.segmenter.surface.components import connect
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M

@@ -12,7 +12,7 @@ import pytest
 from bridge import sample_messages as messages
 from objreg_ros.bridge.camera import lenses
 from objreg_ros.bridge.camera.calibration import Calibration, absolute, fitted, of_numbers, read_calibration
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import camera_from_msg
 from objreg_ros.lens import UPRIGHT
 
 WRITTEN = """\
@@ -48,7 +48,7 @@ def written(folder: Path, text: str = WRITTEN) -> str:
 
 
 def pinhole(camera: Any) -> tuple[float, ...]:
-    told = from_msg.intrinsics(camera)
+    told = camera_from_msg.intrinsics(camera)
     return told.fx, told.fy, told.cx, told.cy, told.width, told.height
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from objreg_ros.bridge.camera.camera_checks import check_camera
-from objreg_ros.data import Intrinsics
-from objreg_ros.recording import messages
+from objreg_ros.data.images import Intrinsics
+from objreg_tools.recording.rosbag import messages
 
 KINECT = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
 

@@ -9,7 +9,9 @@ from plausibility.moving import CAMERA, MOUNT
 from objreg_ros.bridge.camera.camera_stream import CameraStream
 from objreg_ros.bridge.camera.frames import FrameTree
 from objreg_ros.bridge.camera.mount import Mount
-from objreg_ros.data import Array, Frame, Intrinsics, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame, Odometry
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose_error
 
 SECONDS = np.arange(0.0, 12.0, 0.1)

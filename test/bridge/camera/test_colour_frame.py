@@ -10,7 +10,7 @@ import pytest
 from bridge.sample_messages import camera_info, image
 from objreg_ros.bridge.camera import lenses
 from objreg_ros.bridge.camera.colour_frame import Cameras, Seen, depth_image, in_optical_frame, named_registered
-from objreg_ros.data import PointCloud
+from objreg_ros.data.images import PointCloud
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 
 R_BODY_OPTICAL = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])

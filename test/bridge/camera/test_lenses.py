@@ -12,7 +12,8 @@ from bridge import sample_messages as messages
 from objreg_ros.bridge.camera import lenses
 from objreg_ros.bridge.camera.lenses import Raw, raw_pictures
 from objreg_ros.bridge.messages import from_msg
-from objreg_ros.data import Array, Detections, PointCloud
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import Detections, PointCloud
 
 K = [500.0, 0, 319.5, 0, 500.0, 239.5, 0, 0, 1]
 P = (450.0, 0, 310.0, 0, 0, 460.0, 240.0, 0, 0, 0, 1, 0)

@@ -7,7 +7,7 @@ import pytest
 from bridge.trees import SECOND, moved, panning, said, transform, turned
 from objreg_ros.bridge.camera.frames import FrameTree
 from objreg_ros.bridge.camera.mount import Body, Mount, Seat, nameless_body
-from objreg_ros.data import Odometry
+from objreg_ros.data.frames import Odometry
 
 
 def words(child: str) -> list[Odometry]:

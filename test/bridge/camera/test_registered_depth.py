@@ -6,7 +6,7 @@ import pytest
 
 from objreg_ros.bridge.camera import registered_depth
 from objreg_ros.bridge.camera.registered_depth import camera_for, moved, register, warm
-from objreg_ros.data import DepthImage, Intrinsics
+from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.geometry import pose, rotation_from_vector
 
 DEPTH = Intrinsics(fx=60.0, fy=60.0, cx=39.5, cy=29.5, width=80, height=60)

@@ -9,7 +9,7 @@ import pytest
 
 from objreg_ros.bridge.camera import transforms
 from objreg_ros.bridge.camera.transforms import receive_frames, receive_mount
-from objreg_ros.data import Odometry
+from objreg_ros.data.frames import Odometry
 
 
 class Listener:

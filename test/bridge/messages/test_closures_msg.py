@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from objreg_ros import limits
-from objreg_ros.bridge.messages import closures_msg, from_msg, layout
-from objreg_ros.data import LoopClosure, ObjectMatch, Observation, Reason, Rejected
+from objreg_ros.bridge.messages import closures_msg, headers, layout
+from objreg_ros.data.closures import LoopClosure, ObjectMatch, Observation, Reason, Rejected
 from objreg_ros.geometry import pose, rotation_from_vector
 
 STAMP = 1_700_000_000_123_456_789
@@ -74,7 +74,7 @@ def test_a_closure_comes_back_with_all_that_is_known_of_it() -> None:
     message = closures_msg.loop_closure(CLOSURE, "robot1")
     assert_same(replace(CLOSURE, **OF_ONE), closures_msg.read_loop_closure(message))
     assert (message.from_moment.robot, message.to_moment.session, message.retracted) == ("robot1", "12", False)
-    assert message.header.frame_id == "front" and from_msg.stamp_ns(message) == STAMP
+    assert message.header.frame_id == "front" and headers.stamp_ns(message) == STAMP
 
 
 @pytest.mark.usefixtures("there")

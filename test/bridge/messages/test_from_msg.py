@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bridge import sample_messages as messages
-from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers, motion_from_msg
 from objreg_ros.bridge.messages.layout import DETECTIONS, OBJECTS, SUPPORT_ID, VIEW
-from objreg_ros.data import FeltGravity
+from objreg_ros.data.frames import FeltGravity
 from objreg_ros.geometry import pose, rotation_from_vector
 
 K = [500.0, 0, 31.5, 0, 510.0, 23.5, 0, 0, 1]
@@ -30,7 +30,7 @@ def packed_cloud(height: int = 3, width: int = 4) -> np.ndarray:
 
 def test_the_stamp_of_a_header_a_message_and_a_time_is_the_same() -> None:
     message = messages.cloud(packed_cloud(), stamp_ns=12_000_000_345)
-    assert {from_msg.stamp_ns(m) for m in (message, message.header, message.header.stamp)} == {12_000_000_345}
+    assert {headers.stamp_ns(m) for m in (message, message.header, message.header.stamp)} == {12_000_000_345}
 
 
 def test_depth_comes_with_the_size_of_its_camera() -> None:
@@ -51,14 +51,14 @@ def test_colour_of_another_size_is_not_taken_for_registered() -> None:
 
 def test_an_uncalibrated_camera_is_refused() -> None:
     with pytest.raises(ValueError, match="calibrated K"):
-        from_msg.intrinsics(UNCALIBRATED)
+        camera_from_msg.intrinsics(UNCALIBRATED)
 
 
 def test_binning_and_region_of_interest_move_the_camera() -> None:
     info = messages.camera_info(K, 64, 48)
     info.binning_x = info.binning_y = 2
     info.roi.x_offset, info.roi.y_offset, info.roi.width, info.roi.height = 10, 4, 40, 30
-    camera = from_msg.intrinsics(info)
+    camera = camera_from_msg.intrinsics(info)
     assert (camera.fx, camera.cx, camera.cy) == (250.0, 10.75, 9.75)
     assert (camera.width, camera.height) == (20, 15)
 
@@ -66,7 +66,7 @@ def test_binning_and_region_of_interest_move_the_camera() -> None:
 def test_each_axis_is_binned_by_its_own_number() -> None:
     info = messages.camera_info(K, 64, 48)
     info.binning_x, info.binning_y, info.roi.y_offset = 2, 4, 4
-    camera = from_msg.intrinsics(info)
+    camera = camera_from_msg.intrinsics(info)
     assert (camera.fx, camera.fy, camera.cx, camera.cy) == (250.0, 127.5, 15.75, 4.875)
     assert (camera.width, camera.height) == (32, 12)
 
@@ -75,18 +75,18 @@ def test_intrinsics_of_ros_1_are_read_too() -> None:
     info = messages.camera_info(K, 64, 48)
     info.K, info.P = info.k, info.p
     del info.k, info.p
-    assert from_msg.intrinsics(info).fy == 510.0
+    assert camera_from_msg.intrinsics(info).fy == 510.0
     info.P = P
-    assert from_msg.intrinsics(info).fy == 410.0
+    assert camera_from_msg.intrinsics(info).fy == 410.0
 
 
 def test_the_camera_of_a_rectified_picture_is_that_of_the_projection_matrix() -> None:
     info = messages.camera_info(K, 64, 48, P)
-    camera = from_msg.intrinsics(info)
+    camera = camera_from_msg.intrinsics(info)
     assert (camera.fx, camera.fy, camera.cx, camera.cy) == (400.0, 410.0, 30.5, 22.5)
     info.binning_x = info.binning_y = 2
     info.roi.x_offset, info.roi.y_offset, info.roi.width, info.roi.height = 10, 4, 40, 30
-    camera = from_msg.intrinsics(info)
+    camera = camera_from_msg.intrinsics(info)
     assert (camera.fx, camera.cx, camera.cy) == (200.0, 10.25, 9.25)
 
 
@@ -94,7 +94,7 @@ def test_the_camera_of_a_rectified_picture_is_that_of_the_projection_matrix() ->
 @pytest.mark.parametrize("axis", [0, 5])
 def test_a_projection_matrix_that_cannot_be_is_refused_though_K_could(f: float, axis: int) -> None:
     with pytest.raises(ValueError, match=r"expected a calibrated P with focal lengths above 0, got .*(-400|nan)"):
-        from_msg.intrinsics(messages.camera_info(K, 64, 48, (*P[:axis], f, *P[axis + 1 :])))
+        camera_from_msg.intrinsics(messages.camera_info(K, 64, 48, (*P[:axis], f, *P[axis + 1 :])))
 
 
 def test_the_view_is_of_the_camera_of_its_projection_matrix() -> None:
@@ -104,20 +104,20 @@ def test_the_view_is_of_the_camera_of_its_projection_matrix() -> None:
 
 def test_an_organised_cloud_needs_no_camera_and_so_no_calibration() -> None:
     cloud = from_msg.point_cloud(messages.cloud(packed_cloud()))
-    assert from_msg.camera_of_cloud(None, cloud) is None
-    assert from_msg.camera_of_cloud(UNCALIBRATED, cloud) is None
+    assert camera_from_msg.camera_of_cloud(None, cloud) is None
+    assert camera_from_msg.camera_of_cloud(UNCALIBRATED, cloud) is None
     for calibrated, fx in ((messages.camera_info(K, 4, 3), 500.0), (messages.camera_info([0.0] * 9, 4, 3, P), 400.0)):
-        camera = from_msg.camera_of_cloud(calibrated, cloud)
+        camera = camera_from_msg.camera_of_cloud(calibrated, cloud)
         assert camera is not None and camera.fx == fx
     with pytest.raises(ValueError, match=r"expected a calibrated K with focal lengths above 0, got .-1"):
-        from_msg.camera_of_cloud(messages.camera_info([-1.0, *K[1:]], 4, 3), cloud)
+        camera_from_msg.camera_of_cloud(messages.camera_info([-1.0, *K[1:]], 4, 3), cloud)
 
 
 def test_an_uncalibrated_camera_projects_no_cloud_and_no_depth() -> None:
     cloud = from_msg.point_cloud(messages.cloud(packed_cloud(height=1)))
-    assert from_msg.camera_of_cloud(None, cloud) is None
+    assert camera_from_msg.camera_of_cloud(None, cloud) is None
     with pytest.raises(ValueError, match=r"expected a calibrated K with focal lengths above 0, got .0"):
-        from_msg.camera_of_cloud(UNCALIBRATED, cloud)
+        camera_from_msg.camera_of_cloud(UNCALIBRATED, cloud)
     with pytest.raises(ValueError, match=r"expected a calibrated K with focal lengths above 0, got .0"):
         from_msg.depth_image(messages.image(np.full((3, 4), 1500, np.uint16), "16UC1"), UNCALIBRATED)
 
@@ -207,21 +207,21 @@ def test_a_datatype_that_does_not_exist_is_refused() -> None:
 
 def test_odometry_is_a_pose() -> None:
     half = np.sqrt(0.5)
-    word = from_msg.odometry(messages.odometry((0, 0, half, half), (1, 2, 3)))
+    word = motion_from_msg.odometry(messages.odometry((0, 0, half, half), (1, 2, 3)))
     assert np.allclose(word.T_odom_body[:3, :3], rotation_from_vector(np.array([0, 0, np.pi / 2])))
     assert word.T_odom_body[:3, 3].tolist() == [1, 2, 3] and word.child_frame_id == "base_link"
 
 
 def test_gravity_is_down_in_the_frame_of_a_level_odometry() -> None:
     half = np.sqrt(0.5)
-    on_its_side = from_msg.odometry(
+    on_its_side = motion_from_msg.odometry(
         messages.odometry((half, 0, 0, half), (1, 2, 3))
     )  # a quarter turn about x: the body's y is up
-    assert from_msg.level_gravity(0, None) is None
-    assert np.allclose(from_msg.level_gravity(0, (from_msg.odometry(messages.odometry()),)), (0, 0, -1))
-    assert np.allclose(from_msg.level_gravity(0, (on_its_side,)), (0, -1, 0))
+    assert motion_from_msg.level_gravity(0, None) is None
+    assert np.allclose(motion_from_msg.level_gravity(0, (motion_from_msg.odometry(messages.odometry()),)), (0, 0, -1))
+    assert np.allclose(motion_from_msg.level_gravity(0, (on_its_side,)), (0, -1, 0))
     T_body_camera = pose(rotation_from_vector(np.array([0, 0, np.pi / 2])), np.ones(3))  # the body's y is its x
-    assert np.allclose(from_msg.level_gravity(0, (on_its_side,), T_body_camera), (-1, 0, 0))
+    assert np.allclose(motion_from_msg.level_gravity(0, (on_its_side,), T_body_camera), (-1, 0, 0))
 
 
 def imu(**changes: object) -> SimpleNamespace:
@@ -239,32 +239,32 @@ def imu(**changes: object) -> SimpleNamespace:
 
 
 def test_an_imu_tells_what_its_covariances_say_that_it_measures() -> None:
-    word = from_msg.imu(imu())
+    word = motion_from_msg.imu(imu())
     assert word.acceleration is not None and word.acceleration.tolist() == [0.0, -9.8, 0.1]
     assert word.angular_velocity is not None and word.angular_velocity.tolist() == [0.1, 0.2, 0.3]
     assert (word.orientation, word.stamp_ns, word.frame_id) == (None, 1_000_000_005, "imu")
     unknown = np.array([-1.0, *np.zeros(8)])
-    word = from_msg.imu(imu(linear_acceleration_covariance=unknown, angular_velocity_covariance=unknown))
+    word = motion_from_msg.imu(imu(linear_acceleration_covariance=unknown, angular_velocity_covariance=unknown))
     assert word.acceleration is None and word.angular_velocity is None
 
 
 def test_an_orientation_is_a_unit_quaternion_that_somebody_set() -> None:
     told = {"orientation_covariance": np.diag([4e-4, 1e-4, 9.0]).ravel()}
-    word = from_msg.imu(imu(**told))
+    word = motion_from_msg.imu(imu(**told))
     assert word.orientation is not None and word.orientation_sigma_deg == pytest.approx(np.degrees(0.02))
     empty = np.zeros(9)
-    assert from_msg.imu(imu(orientation_covariance=empty)).orientation is None
+    assert motion_from_msg.imu(imu(orientation_covariance=empty)).orientation is None
     turned = SimpleNamespace(x=0.6, y=0.0, z=0.0, w=0.8)
-    assert from_msg.imu(imu(orientation_covariance=empty, orientation=turned)).orientation is not None
+    assert motion_from_msg.imu(imu(orientation_covariance=empty, orientation=turned)).orientation is not None
     nothing = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
-    assert from_msg.imu(imu(**told, orientation=nothing)).orientation is None
+    assert motion_from_msg.imu(imu(**told, orientation=nothing)).orientation is None
 
 
 @pytest.mark.parametrize("field", ["linear_acceleration", "angular_velocity", "orientation"])
 def test_an_imu_that_measures_no_number_is_refused(field: str) -> None:
     broken = SimpleNamespace(x=0.0, y=float("nan"), z=0.0, w=0.0)
     with pytest.raises(ValueError, match="ImuSample: expected finite"):
-        from_msg.imu(imu(**{field: broken, "orientation_covariance": np.full(9, 1e-4)}))
+        motion_from_msg.imu(imu(**{field: broken, "orientation_covariance": np.full(9, 1e-4)}))
 
 
 def test_gravity_between_two_words_is_between_theirs_and_as_sure_as_the_less_sure() -> None:
@@ -272,13 +272,13 @@ def test_gravity_between_two_words_is_between_theirs_and_as_sure_as_the_less_sur
         gravity = np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees)), 0.0])
         return FeltGravity(gravity=gravity, gravity_sigma_deg=sigma_deg, stamp_ns=stamp_ns, frame_id=frame_id)
 
-    between = from_msg.gravity_at(15, (word(10, 0.0, 1.0), word(20, 4.0, 2.0)))
+    between = motion_from_msg.gravity_at(15, (word(10, 0.0, 1.0), word(20, 4.0, 2.0)))
     assert between.gravity == pytest.approx(word(15, 2.0, 2.0).gravity)
     assert (between.gravity_sigma_deg, between.stamp_ns) == (2.0, 15)
     alone = word(10, 0.0, 1.0)
-    assert from_msg.gravity_at(15, (alone,)) is alone
+    assert motion_from_msg.gravity_at(15, (alone,)) is alone
     other = word(20, 4.0, 2.0, "another")
-    assert from_msg.gravity_at(18, (alone, other)) is other
+    assert motion_from_msg.gravity_at(18, (alone, other)) is other
 
 
 def test_a_stamped_pose_and_a_transform_are_odometry_too() -> None:
@@ -287,12 +287,12 @@ def test_a_stamped_pose_and_a_transform_are_odometry_too() -> None:
     transform = SimpleNamespace(translation=full.pose.pose.position, rotation=full.pose.pose.orientation)
     moved = SimpleNamespace(header=full.header, child_frame_id="camera", transform=transform)
     for message in (stamped, moved):
-        assert from_msg.odometry(message).T_odom_body[:3, 3].tolist() == [1, 2, 3]
+        assert motion_from_msg.odometry(message).T_odom_body[:3, 3].tolist() == [1, 2, 3]
 
 
 def test_a_pose_without_a_rotation_is_refused() -> None:
     with pytest.raises(ValueError, match="quaternion"):
-        from_msg.odometry(messages.odometry((0, 0, 0, 0)))
+        motion_from_msg.odometry(messages.odometry((0, 0, 0, 0)))
 
 
 def test_a_constraint_tells_its_two_moments() -> None:
@@ -328,11 +328,11 @@ def test_a_moment_that_no_stamp_can_hold_is_refused(name: str) -> None:
 )
 def test_a_stamp_that_no_message_can_carry_is_refused(sec: int, nanosec: int, complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
-        from_msg.stamp_ns(SimpleNamespace(sec=sec, nanosec=nanosec))
+        headers.stamp_ns(SimpleNamespace(sec=sec, nanosec=nanosec))
 
 
 def test_the_first_and_the_last_stamp_there_is_are_stamps() -> None:
-    assert from_msg.stamp_ns(SimpleNamespace(sec=-(2**31), nanosec=0)) == -(2**31) * 10**9
+    assert headers.stamp_ns(SimpleNamespace(sec=-(2**31), nanosec=0)) == -(2**31) * 10**9
     assert from_msg.moment("camera@2147483647.999999999") == ("camera", 2**31 * 10**9 - 1)
 
 
@@ -340,9 +340,9 @@ def test_a_name_beyond_all_sense_is_refused() -> None:
     with pytest.raises(ValueError, match="child_frame_id: expected at most 1000 characters, got 1001"):
         message = messages.odometry()
         message.child_frame_id = "x" * 1001
-        from_msg.odometry(message)
+        motion_from_msg.odometry(message)
     with pytest.raises(ValueError, match="frame_id: expected at most 1000 characters, got 2000"):
-        from_msg.odometry(messages.odometry(frame_id="y" * 2000))
+        motion_from_msg.odometry(messages.odometry(frame_id="y" * 2000))
 
 
 def test_a_frame_may_have_an_at_sign_in_its_name() -> None:
@@ -501,7 +501,7 @@ def test_a_camera_of_more_pixels_than_any_picture_projects_no_cloud() -> None:
     for size in (20_000, 1_000_000):
         info = messages.camera_info([500.0, 0, size / 2, 0, 500, size / 2, 0, 0, 1], size, size)
         with pytest.raises(ValueError, match="expected at most"):
-            from_msg.camera_of_cloud(info, cloud)
+            camera_from_msg.camera_of_cloud(info, cloud)
 
 
 def test_no_objects_are_no_objects() -> None:
@@ -531,7 +531,7 @@ def test_a_frame_is_made_of_its_four_messages() -> None:
         info,
         gravity_message(0, 0.5, 0),
         {3: "cup"},
-        [from_msg.odometry(messages.odometry(at=(1, 0, 0)))],
+        [motion_from_msg.odometry(messages.odometry(at=(1, 0, 0)))],
     )
     assert [cloud.label for cloud in frame.objects] == ["4", "cup"]
     assert frame.view.grey is not None and frame.view.grey[0, 0] == 0x40
@@ -545,23 +545,25 @@ def test_the_camera_sits_where_the_body_carries_it() -> None:
     T_body_camera[1, 3] = 2
     parts = (messages.own_table(object_rows()), view, info, gravity_message(0, 0, 0), {})
     half = np.sqrt(0.5)
-    word = from_msg.odometry(messages.odometry((0, 0, half, half), (1, 0, 0)))  # the body's y is back along odom's x
+    word = motion_from_msg.odometry(
+        messages.odometry((0, 0, half, half), (1, 0, 0))
+    )  # the body's y is back along odom's x
     frame = from_msg.frame(*parts, [word], T_body_camera)
     assert frame.T_odom_camera is not None and np.allclose(frame.T_odom_camera[:3, 3], (-1, 0, 0))
     assert frame.gravity is None and frame.gravity_confidence == 0
 
 
 def test_a_pose_between_two_messages_is_between_theirs() -> None:
-    around = [from_msg.odometry(messages.odometry(at=(x, 0, 0), stamp_ns=60 + 40 * x)) for x in (1, 2)]
-    np.testing.assert_allclose(from_msg.pose_at(110, around)[:3, 3], (1.25, 0, 0))
-    assert from_msg.pose_at(110, around[:1])[0, 3] == 1
-    assert from_msg.pose_at(500, around)[0, 3] == 2 and from_msg.pose_at(0, around)[0, 3] == 1
+    around = [motion_from_msg.odometry(messages.odometry(at=(x, 0, 0), stamp_ns=60 + 40 * x)) for x in (1, 2)]
+    np.testing.assert_allclose(motion_from_msg.pose_at(110, around)[:3, 3], (1.25, 0, 0))
+    assert motion_from_msg.pose_at(110, around[:1])[0, 3] == 1
+    assert motion_from_msg.pose_at(500, around)[0, 3] == 2 and motion_from_msg.pose_at(0, around)[0, 3] == 1
 
 
 def test_there_is_nothing_between_poses_in_two_frames() -> None:
-    around = [from_msg.odometry(messages.odometry(at=(x, 0, 0), stamp_ns=100 * x)) for x in (1, 2)]
+    around = [motion_from_msg.odometry(messages.odometry(at=(x, 0, 0), stamp_ns=100 * x)) for x in (1, 2)]
     around[1] = replace(around[1], frame_id="another")
-    assert [from_msg.pose_at(moment, around)[0, 3] for moment in (120, 180)] == [1, 2]
+    assert [motion_from_msg.pose_at(moment, around)[0, 3] for moment in (120, 180)] == [1, 2]
 
 
 @pytest.mark.parametrize("other", range(4))

@@ -8,7 +8,7 @@ import pytest
 from objreg_ros import limits
 from objreg_ros.bridge.messages import label_table
 from objreg_ros.bridge.messages.label_table import LabelTable
-from objreg_ros.data import UNNAMED
+from objreg_ros.data.frames import UNNAMED
 
 
 def test_a_name_that_is_met_gets_a_number_once() -> None:

@@ -6,7 +6,9 @@ import pytest
 from visualization_msgs.msg import Marker
 
 from objreg_ros.bridge.messages.markers import GOLD, WHITE, Scene
-from objreg_ros.data import Frame, Intrinsics, LoopClosure, Reason, Rejected, View
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.frames import Frame, View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import pose
 
 CAMERA = Intrinsics(fx=1.0, fy=1.0, cx=0.0, cy=0.0, width=2, height=2)

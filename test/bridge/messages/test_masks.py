@@ -14,7 +14,7 @@ from objreg_ros import limits
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.bridge.messages.layout import DETECTIONS, MASK
 from objreg_ros.bridge.messages.masks import read_masks, with_masks
-from objreg_ros.data import Detections
+from objreg_ros.data.images import Detections
 
 HW = 60, 80
 XYXY = [[10.4, 5.5, 30.0, 20.2], [20, 10, 60, 50], [90, 70, 99, 80]]  # the last one lies outside

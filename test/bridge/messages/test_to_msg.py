@@ -8,24 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers, motion_from_msg, to_msg
 from objreg_ros.bridge.messages.layout import OBJECTS, SUPPORT_ID, UNNAMED_ID, table
-from objreg_ros.data import (
-    UNNAMED,
-    ColourImage,
-    DepthImage,
-    Detections,
-    Frame,
-    Intrinsics,
-    LoopClosure,
-    ObjectCloud,
-    ObjectMatch,
-    Observation,
-    Odometry,
-    PointCloud,
-    PointFlag,
-    View,
-)
+from objreg_ros.data.closures import LoopClosure, ObjectMatch, Observation
+from objreg_ros.data.frames import UNNAMED, Frame, ObjectCloud, Odometry, PointFlag, View
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics, PointCloud
 from objreg_ros.geometry import pose, rotation_from_vector
 
 STAMP = 1_700_000_000_123_456_789
@@ -82,8 +69,8 @@ def closure(*matches: ObjectMatch) -> LoopClosure:
 
 
 def test_a_stamp_survives_to_the_nanosecond() -> None:
-    assert from_msg.stamp_ns(to_msg.header(STAMP, "kinect")) == STAMP
-    assert from_msg.stamp_ns(to_msg.clock(STAMP).clock) == STAMP
+    assert headers.stamp_ns(to_msg.header(STAMP, "kinect")) == STAMP
+    assert headers.stamp_ns(to_msg.clock(STAMP).clock) == STAMP
 
 
 def test_a_colour_image_comes_back_as_it_was() -> None:
@@ -112,7 +99,7 @@ def test_depth_comes_back_exactly_in_metres_and_to_half_a_millimetre_in_16_bits(
 
 def test_a_camera_comes_back_as_it_was() -> None:
     info = to_msg.camera_info(CAMERA, STAMP, "kinect")
-    back = from_msg.intrinsics(info)
+    back = camera_from_msg.intrinsics(info)
     assert (back.fx, back.fy, back.cx, back.cy, back.width, back.height) == (525.0, 524.5, 3.25, 2.5, 8, 6)
     assert np.array_equal(info.p.reshape(3, 4)[:, :3], info.k.reshape(3, 3)) and not info.p.reshape(3, 4)[:, 3].any()
     assert np.array_equal(info.r.reshape(3, 3), np.eye(3)) and not np.any(info.d)
@@ -156,7 +143,7 @@ def test_no_detection_gives_an_empty_table_with_the_header_of_the_image() -> Non
 
 def test_the_table_of_a_surplus_picture_says_so_and_no_other_does() -> None:
     message = to_msg.surplus(STAMP, "kinect")
-    assert from_msg.is_surplus(message) and from_msg.stamp_ns(message) == STAMP
+    assert from_msg.is_surplus(message) and headers.stamp_ns(message) == STAMP
     assert (message.header.frame_id, message.width, len(message.data)) == ("kinect", 0, 0)
     assert not from_msg.is_surplus(to_msg.PointCloud2())
     empty = np.zeros((0, 4), np.float32)
@@ -245,7 +232,7 @@ def test_a_constraint_comes_back_with_both_moments_and_its_covariance() -> None:
     message = to_msg.constraint(sent)
     assert message.header.frame_id == "front@0.000000005"
     assert message.child_frame_id == "kinect@1700000000.123456789"
-    assert from_msg.stamp_ns(message) == STAMP
+    assert headers.stamp_ns(message) == STAMP
     back = from_msg.loop_closure(message)
     assert (back.from_ns, back.to_ns, back.from_frame_id, back.to_frame_id) == (5, STAMP, "front", "kinect")
     assert np.allclose(back.T_from_to, sent.T_from_to, atol=1e-12) and np.array_equal(back.covariance, sent.covariance)
@@ -255,8 +242,8 @@ def test_each_object_of_a_closure_is_one_transform_that_names_it() -> None:
     sent = closure(ObjectMatch(label="cup", object_id=3), ObjectMatch(label="cup", object_id=8))
     messages = to_msg.transforms(sent)
     assert [m.child_frame_id for m in messages] == [f"kinect@1700000000.123456789/cup_{n}" for n in (3, 8)]
-    assert all(np.allclose(from_msg.odometry(m).T_odom_body, sent.T_from_to, atol=1e-12) for m in messages)
-    assert {(from_msg.stamp_ns(m), m.header.frame_id) for m in messages} == {(STAMP, "front@0.000000005")}
+    assert all(np.allclose(motion_from_msg.odometry(m).T_odom_body, sent.T_from_to, atol=1e-12) for m in messages)
+    assert {(headers.stamp_ns(m), m.header.frame_id) for m in messages} == {(STAMP, "front@0.000000005")}
 
 
 def test_landmarks_tell_where_each_object_of_a_keyframe_was_and_which_it_is() -> None:
@@ -265,7 +252,7 @@ def test_landmarks_tell_where_each_object_of_a_keyframe_was_and_which_it_is() ->
     ]
     message = to_msg.landmarks(seen, STAMP, "kinect", {4: "book", 6: "cup"})
     records = table(message, "object_id", "class_id")[0]
-    assert (from_msg.stamp_ns(message), message.header.frame_id) == (STAMP, "kinect")
+    assert (headers.stamp_ns(message), message.header.frame_id) == (STAMP, "kinect")
     assert records["object_id"].tolist() == [7, 9] and records["class_id"].tolist() == [6, 4]
     assert np.allclose([records[axis] for axis in "xyz"], [[7, 9], [0.5, 0.5], [2, 2]])
     (left,) = table(to_msg.landmarks(seen, STAMP, "kinect", {3: "book"}), "object_id", "class_id")
@@ -275,15 +262,15 @@ def test_landmarks_tell_where_each_object_of_a_keyframe_was_and_which_it_is() ->
 def test_a_path_keeps_the_time_and_the_place_of_each_pose() -> None:
     T = pose(rotation_from_vector(np.array([0.0, 0.0, 0.5])), np.array([3.0, 2.0, 1.0]))
     message = to_msg.path([(STAMP, np.eye(4)), (STAMP + 5, T)], STAMP + 9, "map")
-    assert [from_msg.stamp_ns(item) for item in (message, *message.poses)] == [STAMP + 9, STAMP, STAMP + 5]
+    assert [headers.stamp_ns(item) for item in (message, *message.poses)] == [STAMP + 9, STAMP, STAMP + 5]
     assert {item.header.frame_id for item in (message, *message.poses)} == {"map"}
-    assert np.allclose(from_msg.odometry(message.poses[1]).T_odom_body, T, atol=1e-12)
+    assert np.allclose(motion_from_msg.odometry(message.poses[1]).T_odom_body, T, atol=1e-12)
 
 
 def test_odometry_comes_back_as_it_was() -> None:
     T = pose(rotation_from_vector(np.array([3.0, 0.5, 0.2])), np.array([3.0, 2.0, 1.0]))
     word = Odometry(T_odom_body=T, stamp_ns=STAMP, frame_id="world", child_frame_id="kinect")
-    back = from_msg.odometry(to_msg.odometry(word))
+    back = motion_from_msg.odometry(to_msg.odometry(word))
     assert np.allclose(back.T_odom_body, T, atol=1e-12)
     assert (back.stamp_ns, back.frame_id, back.child_frame_id) == (STAMP, "world", "kinect")
 
@@ -296,7 +283,7 @@ def test_labels_come_back_with_numbers_for_keys() -> None:
 def test_a_receipt_tells_the_node_the_frame_and_what_became_of_it() -> None:
     published, dropped = to_msg.finished("segmenter", STAMP), to_msg.finished("segmenter", STAMP, "unmatched")
     assert (published.frame_id, dropped.frame_id) == ("segmenter published", "segmenter dropped unmatched")
-    assert from_msg.stamp_ns(published) == STAMP
+    assert headers.stamp_ns(published) == STAMP
 
 
 @pytest.mark.parametrize("stamp_ns", [-(2**31) * 10**9 - 1, 2**31 * 10**9])

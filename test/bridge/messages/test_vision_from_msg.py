@@ -12,7 +12,7 @@ import pytest
 
 from bridge.sample_messages import camera_info, header, image
 from objreg_ros.bridge.messages import vision_from_msg
-from objreg_ros.data import UNNAMED
+from objreg_ros.data.frames import UNNAMED
 
 HW = (100, 200)
 

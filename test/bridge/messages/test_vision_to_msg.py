@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from bridge.messages.test_to_msg import STAMP, cloud_of, frame_of
-from objreg_ros.bridge.messages import from_msg, vision_from_msg, vision_to_msg
-from objreg_ros.data import Detections
+from objreg_ros.bridge.messages import headers, vision_from_msg, vision_to_msg
+from objreg_ros.data.images import Detections
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_a_box_has_its_middle_its_size_and_its_name(types: None) -> None:
     assert (found.bbox.center.position.x, found.bbox.center.position.y) == (25.0, 60.0)
     assert (found.bbox.size_x, found.bbox.size_y) == (30.0, 80.0)
     assert (result.hypothesis.class_id, result.hypothesis.score, found.id) == ("tv", 0.5, "7")
-    assert from_msg.stamp_ns(message) == from_msg.stamp_ns(found) == STAMP
+    assert headers.stamp_ns(message) == headers.stamp_ns(found) == STAMP
 
 
 def test_boxes_come_back_as_they_went(types: None) -> None:

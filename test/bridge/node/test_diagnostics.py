@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import balance_of, diagnostic, refusal_of, refusals
-from objreg_ros.data import Reason, Rejected
+from objreg_ros.data.closures import Reason, Rejected
 
 BOOKS = Balance(
     received=10,

@@ -11,9 +11,9 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from std_msgs.msg import String
 
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.intra_process import IntraProcessBus
 from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.params import ManagedParams, NodeBaseParams
+from objreg_ros.bridge.process.intra_process import IntraProcessBus
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 

@@ -17,7 +17,8 @@ from std_srvs.srv import Trigger
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.drops import Drops
 from objreg_ros.bridge.node.log import ThrottledLog
-from objreg_ros.bridge.node.node_base import REST, DroppedError, NodeBase
+from objreg_ros.bridge.node.node_base import DroppedError, NodeBase
+from objreg_ros.bridge.node.services import REST
 
 
 @pytest.fixture

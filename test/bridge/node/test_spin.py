@@ -27,7 +27,7 @@ from objreg_ros.bridge.node.spin import run
 def on_its_own(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A graph that ends at this machine; the transport and the frozen garbage of a node are not for other tests."""
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    monkeypatch.setattr("objreg_ros.bridge.node.profile.apply", lambda: "the transport")
+    monkeypatch.setattr("objreg_ros.bridge.process.profile.apply", lambda: "the transport")
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
     for number, handler in handlers.items():
@@ -88,7 +88,7 @@ def test_a_signal_while_a_node_is_made_ends_it_at_once_with_status_0(number: sig
 
 COMPILING = """
 import concurrent.futures, threading, time
-from objreg_ros.bridge.node.lifetime import await_kernels
+from objreg_ros.bridge.process.lifetime import await_kernels
 from objreg_ros.bridge.node.spin import run
 pool = concurrent.futures.ThreadPoolExecutor(1)  # Python waits for its threads at the end
 def prepare():

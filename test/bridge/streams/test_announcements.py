@@ -16,7 +16,7 @@ from rclpy.node import Node
 from objreg_ros.bridge.messages import closures_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.streams.announcements import Announcements
-from objreg_ros.data import LoopClosure, Observation, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, Observation, Reason, Rejected
 
 CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",), to_session=1)
 REJECTED = Rejected(reason=Reason.NO_CANDIDATE, from_ns=9, to_ns=9, detail="none of 3")
@@ -47,9 +47,9 @@ def received(node: Node, kind: type, topic: str, profile: Any) -> list[Any]:
     return messages
 
 
-def wait_for(node: Node, *heaps: list[Any]) -> None:
+def wait_for(node: Node, *clusters: list[Any]) -> None:
     deadline = time.monotonic() + 20.0
-    while not all(heaps) and time.monotonic() < deadline:
+    while not all(clusters) and time.monotonic() < deadline:
         rclpy.spin_once(node, timeout_sec=0.1)
 
 

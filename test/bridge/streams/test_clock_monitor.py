@@ -4,7 +4,7 @@ from __future__ import annotations
 import pytest
 
 from objreg_ros.bridge.streams.clock_monitor import AHEAD_NS, ClockMonitor
-from objreg_ros.data import JUMP_NS
+from objreg_ros.data.frames import JUMP_NS
 
 NOW = 1000 * JUMP_NS
 PASSED = JUMP_NS // 2  # between two calls of `believe`

@@ -13,7 +13,7 @@ import pytest
 
 from objreg_ros.bridge.messages import closures_msg, to_msg
 from objreg_ros.bridge.streams.closures_in import ClosuresIn
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 
 CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",), to_session=1)
 

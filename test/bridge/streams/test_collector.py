@@ -18,7 +18,9 @@ from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import diagnostic, refusals
 from objreg_ros.bridge.streams import collector as collector_module
 from objreg_ros.bridge.streams.collector import Collector
-from objreg_ros.data import Detections, Frame, Intrinsics, LoopClosure, ObjectCloud, Reason, Rejected, View
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.frames import Frame, ObjectCloud, View
+from objreg_ros.data.images import Detections, Intrinsics
 
 NAMES = {0: "cup", 7: "tv"}
 BOOKS = Balance(10, 6, 1, {"overtaken": 3}, {"image": 2}, {"total": (10.0, 20.0)})

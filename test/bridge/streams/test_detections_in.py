@@ -17,7 +17,8 @@ from objreg_ros.bridge.messages import from_msg, to_msg, vision_from_msg
 from objreg_ros.bridge.streams import detections_in
 from objreg_ros.bridge.streams.detections_in import DetectionsIn
 from objreg_ros.bridge.streams.sync import Drop, Match
-from objreg_ros.data import UNNAMED, ColourImage, DepthImage, Detections, Intrinsics
+from objreg_ros.data.frames import UNNAMED
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics
 
 CAMERA = Intrinsics(fx=60.0, fy=60.0, cx=40.0, cy=30.0, width=80, height=60)
 DEPTH = DepthImage(depth=np.ones((60, 80), np.float32), rgb=None, intrinsics=CAMERA, stamp_ns=5)

@@ -92,10 +92,10 @@ def test_a_request_is_answered_by_the_keyframe(node: NodeBase, monkeypatch: pyte
     made._note(7, b"k")
     made._answer_later()
     made._reader.shutdown()
-    made.tell(7, None)
-    made.tell(7, b"summary")
+    made.send(7, None)
+    made.send(7, b"summary")
     assert out == [("/fleet/keyframes", b"keyframe k"), ("/fleet/summaries", b"summary")]
-    assert made.told() == {"exchange: summaries received": 2}
+    assert made.diagnostics() == {"exchange: summaries received": 2}
     made.close()
 
 
@@ -182,6 +182,6 @@ def test_with_a_key_only_what_it_signed_is_read(node: NodeBase, monkeypatch: pyt
     assert [one.packed for one in taken] == [b"k"] and node._ignored == {"malformed /fleet/keyframes": 2}
     out = list[CompressedImage]()
     monkeypatch.setattr(made._summaries, "publish", out.append)
-    made.tell(7, b"summary")
+    made.send(7, b"summary")
     assert bytes(key.check("/fleet/summaries", out[0]).data) == b"summary"
     made.close()

@@ -3,12 +3,12 @@ from __future__ import annotations
 
 import threading
 
-from objreg_ros.bridge.streams.frame_order import Turns
+from objreg_ros.bridge.streams.frame_order import FrameOrder
 
 
 def test_a_frame_that_is_put_off_is_due_at_once_where_none_is_at_work() -> None:
     due: list[int] = []
-    turns = Turns(lambda stamp_ns, frame_id: due.append(stamp_ns))
+    turns = FrameOrder(lambda stamp_ns, frame_id: due.append(stamp_ns))
     turns.put_off(1, "eye")
     turns.begin(2)
     turns.end(2)
@@ -18,7 +18,7 @@ def test_a_frame_that_is_put_off_is_due_at_once_where_none_is_at_work() -> None:
 
 def test_it_waits_for_every_frame_before_it_and_for_none_behind_it() -> None:
     due: list[int] = []
-    turns = Turns(lambda stamp_ns, frame_id: due.append(stamp_ns))
+    turns = FrameOrder(lambda stamp_ns, frame_id: due.append(stamp_ns))
     turns.begin(1)
     turns.put_off(2, "eye")
     turns.begin(3)
@@ -32,7 +32,7 @@ def test_it_waits_for_every_frame_before_it_and_for_none_behind_it() -> None:
 
 def test_two_frames_of_one_stamp_end_one_by_one() -> None:
     due: list[int] = []
-    turns = Turns(lambda stamp_ns, frame_id: due.append(stamp_ns))
+    turns = FrameOrder(lambda stamp_ns, frame_id: due.append(stamp_ns))
     turns.begin(1)
     turns.put_off(2, "eye")
     turns.begin(1)
@@ -45,7 +45,7 @@ def test_two_frames_of_one_stamp_end_one_by_one() -> None:
 
 def test_threads_keep_the_order() -> None:
     due: list[int] = []
-    turns = Turns(lambda stamp_ns, frame_id: due.append(stamp_ns))
+    turns = FrameOrder(lambda stamp_ns, frame_id: due.append(stamp_ns))
     for stamp in range(0, 400, 2):
         turns.begin(stamp)
         turns.put_off(stamp + 1, "eye")

@@ -15,7 +15,8 @@ from registration.samples import SECOND, box, frame
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.sync import Match
-from objreg_ros.data import Array, Frame, Odometry
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.geometry import pose
 
 PATIENCE = 20.0  # seconds; a test that gets there has failed

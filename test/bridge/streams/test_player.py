@@ -18,7 +18,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header, String
 
-from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_ros.bridge.messages import headers, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.streams import player as player_module
 from objreg_ros.bridge.streams.acknowledgements import IMAGE, Acknowledgements
@@ -69,9 +69,9 @@ class Graph:
         finished = node.create_publisher(Header, "finished", qos.stage(100))
 
         def answer(message: Image) -> None:
-            self.received.append(from_msg.stamp_ns(message))
+            self.received.append(headers.stamp_ns(message))
             if answers:
-                finished.publish(to_msg.finished("detector", from_msg.stamp_ns(message)))
+                finished.publish(to_msg.finished("detector", headers.stamp_ns(message)))
 
         node.create_subscription(Image, "image", answer, qos.stage(100))
         return finished
@@ -142,7 +142,7 @@ def test_without_a_rate_nothing_is_waited_for(player: Player) -> None:
 
 
 def test_the_clock_shows_when_an_item_was_recorded(graph: Graph, player: Player) -> None:
-    graph.receive(Clock, "/clock", lambda m: from_msg.stamp_ns(m.clock))
+    graph.receive(Clock, "/clock", lambda m: headers.stamp_ns(m.clock))
     (ticks,) = (publisher for publisher in player.publishers if publisher.topic_name == "/clock")
     until(lambda: ticks.get_subscription_count() == 1)
     player.play([word("a", 1_700_000_000_000_000_001), word("b", 1_700_000_000_000_000_009)], None, lambda _: None)

@@ -19,10 +19,10 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.node_base import NodeBase
-from objreg_ros.bridge.node.params import RelocalisedParams
 from objreg_ros.bridge.streams import relocalised
+from objreg_ros.bridge.streams.params import RelocalisedParams
 from objreg_ros.bridge.streams.relocalised import Answer, Whereabouts, on_plane, with_covariance
-from objreg_ros.data import Relocalised
+from objreg_ros.data.closures import Relocalised
 from objreg_ros.geometry import pose, rotation_from_vector
 
 AT = pose(rotation_from_vector(np.array([0.0, 0.0, 0.5])), np.array([1.0, 2.0, 3.0]))

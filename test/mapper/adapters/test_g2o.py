@@ -1,33 +1,88 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is written is what g2o's readers expect."""
+"""The file that others read."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
+import pytest
 
-from objreg_ros.mapper.adapters.g2o import edge_text, graph_text
+from objreg_mapper.adapters.g2o import ToG2o
+from objreg_mapper.constraint import Constraint, compensated, local_information
+from objreg_ros.bridge.messages import closures_msg, to_msg
+from objreg_ros.data.frames import Odometry
+from objreg_ros.geometry import inverse, pose, rotation_from_quaternion
 
-from .blank import CONSTRAINT, LOCAL_INFORMATION_DIAGONAL, QUARTER_LEFT
-
-HALF = np.sqrt(0.5)
-
-
-def test_an_edge_has_ids_pose_and_the_upper_triangle_translation_first() -> None:
-    tag, a, b, *numbers = edge_text(3, 8, CONSTRAINT).split()
-    assert (tag, a, b, len(numbers)) == ("EDGE_SE3:QUAT", "3", "8", 7 + 21)
-    values = np.array(numbers, float)
-    np.testing.assert_allclose(values[:7], [1, 2, 3, 0, 0, HALF, HALF], atol=1e-8)
-    upper = np.zeros((6, 6))
-    upper[np.triu_indices(6)] = values[7:]
-    np.testing.assert_allclose(upper, np.diag(LOCAL_INFORMATION_DIAGONAL), atol=1e-12)
+from .standing_by import AHEAD, AHEAD_TEXT, COVARIANCE, MEASURED, body_at, closure
 
 
-def test_a_graph_lists_its_vertices_fixes_the_first_and_ends_with_its_edges() -> None:
-    lines = graph_text([np.eye(4), QUARTER_LEFT], [(0, 1, CONSTRAINT)]).splitlines()
-    assert [line.split()[:2] for line in lines] == [
-        ["VERTEX_SE3:QUAT", "0"],
-        ["VERTEX_SE3:QUAT", "1"],
-        ["FIX", "0"],
-        ["EDGE_SE3:QUAT", "0"],
-    ]
-    assert graph_text([], []) == ""
+def edges(path: Path, apart: int = 2) -> list[list[float]]:
+    """The numbers of the edges between vertices that are no neighbours."""
+    lines = [line.split()[1:] for line in path.read_text().splitlines() if line.startswith("EDGE")]
+    return [[float(number) for number in line] for line in lines if int(line[1]) - int(line[0]) >= apart]
+
+
+def test_odometry_and_constraints_are_in_the_file_number_by_number(around: Callable[..., Any], tmp_path: Path) -> None:
+    path = tmp_path / "graph.g2o"
+    graph = around(f"graph_path:={path}", "period:=0.2", f"T_base_camera:={AHEAD_TEXT}", "keyframe_translation:=0.04")
+    node = graph.start(ToG2o)
+    graph.send(closure(1.5, 9.0))
+    graph.drive(node, 0.0, 10.0)
+    graph.wait(lambda: path.exists() and edges(path))
+    vertices = [line.split() for line in path.read_text().splitlines() if line.startswith("VERTEX")]
+    np.testing.assert_allclose(float(vertices[3][2]), body_at(1.5)[0, 3], atol=1e-9)
+    ((k1, k2, *numbers),) = edges(path)
+    assert (k1, k2) == (3, 18)  # odometry has a pose at either moment
+    told = pose(rotation_from_quaternion(np.array(numbers[3:7])), np.array(numbers[:3]))
+    expected = compensated(Constraint(MEASURED, COVARIANCE), AHEAD, inverse(AHEAD))
+    np.testing.assert_allclose(told, expected.T_from_to, atol=1e-8)
+    information = local_information(expected)[np.triu_indices(6)]
+    np.testing.assert_allclose(numbers[7:], information, rtol=1e-7, atol=1e-4)
+    assert node.accounting.balance().published == 1 and not list(tmp_path.glob(".*.part"))
+
+
+def test_a_retraction_takes_the_edge_out_of_the_file_again(around: Callable[..., Any], tmp_path: Path) -> None:
+    if closures_msg.LoopClosureMsg is None:
+        pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
+    path = tmp_path / "graph.g2o"
+    graph = around(f"graph_path:={path}", "period:=0.1", f"T_base_camera:={AHEAD_TEXT}")
+    node = graph.start(ToG2o)
+    graph.send(closure(1.5, 9.0))
+    message = closures_msg.loop_closure(closure(1.5, 9.0))
+    graph.whole.publish(message)
+    graph.drive(node, 0.0, 10.0)
+    graph.wait(lambda: path.exists() and edges(path))
+    graph.wait(lambda: node.extra_diagnostics()["repeated"] == 1)
+    message.retracted = True
+    graph.whole.publish(message)
+    graph.wait(lambda: not edges(path))
+    assert node.accounting.balance().published == 1 and node.extra_diagnostics()["retracted too late"] == 0
+
+
+def test_odometry_that_begins_anew_begins_another_file(around: Callable[..., Any], tmp_path: Path) -> None:
+    graph = around(f"graph_path:={tmp_path}/graph.g2o", "period:=0.1")
+    node = graph.start(ToG2o)
+    graph.drive(node, 50.0, 53.0)
+    before = (tmp_path / "graph.g2o").read_text() if (tmp_path / "graph.g2o").exists() else ""
+    for seconds in (1.0, 1.5, 2.0, 2.5, 3.0):
+        word = Odometry(T_odom_body=body_at(seconds), stamp_ns=round(seconds * 1e9), child_frame_id="base_link")
+        graph.odom.publish(to_msg.odometry(word))
+    graph.wait(lambda: (tmp_path / "graph_1.g2o").exists())
+    assert (tmp_path / "graph.g2o").read_text().startswith(before) and node.path.name == "graph_1.g2o"
+
+
+def test_what_cannot_be_tied_is_dropped_by_reason(around: Callable[..., Any], tmp_path: Path) -> None:
+    graph = around(f"graph_path:={tmp_path}/graph.g2o", f"T_base_camera:={AHEAD_TEXT}")
+    node = graph.start(ToG2o)
+    graph.drive(node, 5.0, 10.0)
+    graph.send(closure(1.5, 9.0), closure(9.0, 6.0))
+    graph.wait(lambda: node.accounting.balance().dropped == {"before_odometry": 1, "two_clocks": 1})
+
+
+def test_a_folder_that_is_not_there_is_refused_at_start(around: Callable[..., Any], tmp_path: Path) -> None:
+    around(f"graph_path:={tmp_path}/none/graph.g2o")
+    with pytest.raises(ValueError, match="expected a file in a folder that is there"):
+        ToG2o()

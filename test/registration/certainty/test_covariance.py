@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector, skew
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.certainty import covariance
 from objreg_ros.registration.certainty.covariance import NEAREST, covariance_of, spread_of, worst_translation
-from objreg_ros.registration.params import RegistrarParams
 from registration.samples import candidate
 
 PARAMS = RegistrarParams(covariance_scale=4.0, covariance_calibration=0.0)

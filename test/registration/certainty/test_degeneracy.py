@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.certainty.degeneracy import about_camera, systematic_depth_error
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.propose.refinement import refine
 from registration.rooms import keyframe, seen_from

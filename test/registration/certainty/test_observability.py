@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.certainty import observability
 from objreg_ros.registration.certainty.observability import (
     CLEAR_MARGIN,
@@ -20,7 +21,6 @@ from objreg_ros.registration.certainty.observability import (
     split_directions,
 )
 from objreg_ros.registration.certainty.perturbation import perturbed
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from registration.rooms import ROOM, keyframe, seen_from
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose_error, rotation_from_vector, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.certainty.observability import CLEAR_MARGIN
 from objreg_ros.registration.certainty.perturbation import PerturbedScore, perturbed, square_grid, turned_about
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.score.view_score import PHOTOMETRIC_POINTS, score_views
 from registration.rooms import keyframe, seen_from

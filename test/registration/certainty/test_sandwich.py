@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros import sensor
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.certainty import sandwich
 from objreg_ros.registration.certainty.sandwich import FREEDOMS, _spread, information, systematic_depth_error_of_step
 from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.gate import competing
 from objreg_ros.registration.gate.verdict import judge, refuse
 from registration.gate.samples import competitor, lone

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.candidate import KeypointAgreement
 from objreg_ros.registration.gate import free_space
 from objreg_ros.registration.gate.verdict import refuse

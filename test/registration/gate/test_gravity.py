@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.gate import gravity
 from objreg_ros.registration.gate.verdict import refuse
 from registration.samples import candidate

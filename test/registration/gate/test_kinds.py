@@ -13,9 +13,8 @@ from registration.samples import candidate, moved
 CUPS = tuple(ObjectPair(k, k, "cup") for k in range(3))
 
 
-@pytest.mark.parametrize(
-    ("evidence", "name", "reading"),
-    [
+def test_a_reading_is_the_candidate_s_own_number_or_unknown() -> None:
+    for evidence, name, reading in [
         ({"tested": 1000}, "tested", 3.0),
         ({"tested": 0}, "tested", 0.0),
         ({"certain_violations": 0.01}, "certain_violations", 0.01),
@@ -30,12 +29,8 @@ CUPS = tuple(ObjectPair(k, k, "cup") for k in range(3))
         ({"perturbation_margin": None}, "perturbation_margin", None),
         ({"systematic_depth_error": 0.09 * np.eye(6)}, "position_sigma", pytest.approx(0.3, rel=0.01)),
         ({"middle": np.array([0.0, 0.0, 3.0])}, "range", 3.0),
-    ],
-)
-def test_a_reading_is_the_candidate_s_own_number_or_unknown(
-    evidence: dict[str, object], name: str, reading: float | None
-) -> None:
-    assert readings_of(candidate(**evidence))[name] == reading
+    ]:
+        assert readings_of(candidate(**evidence))[name] == reading, evidence
 
 
 def test_the_range_is_that_of_both_cameras() -> None:
@@ -49,4 +44,4 @@ def test_a_pose_of_lower_view_score_is_known_worse() -> None:
 
 def test_knots_ascend_and_every_kind_has_words_for_a_refusal() -> None:
     for kind in KINDS.values():
-        assert list(kind.knots) == sorted(set(kind.knots)) and kind.words
+        assert list(kind.knots) == sorted(set(kind.knots)) and kind.phrase

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.gate import likelihood
 from objreg_ros.registration.gate.kinds import KINDS, readings_of
 from objreg_ros.registration.gate.likelihood import check, log_odds, odds_of, weigh

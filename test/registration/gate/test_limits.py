@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.gate import free_space, surroundings
 from objreg_ros.registration.gate.limits import LIMITS, Limits, limits_of
-from objreg_ros.registration.params import RegistrarParams
 
 
 def test_no_limit_changes_unnoticed() -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.data import UNNAMED, Reason
+from objreg_ros.data.closures import Reason
+from objreg_ros.data.frames import UNNAMED
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate import objects
 from objreg_ros.registration.gate.verdict import refuse

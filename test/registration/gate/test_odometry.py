@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registration.gate import odometry
 from objreg_ros.registration.gate.limits import LIMITS

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import typing
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.gate.refusal import Refusal
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from objreg_ros.data import Reason
+from objreg_ros.data.closures import Reason
 from objreg_ros.registration.candidate import ObjectPair, Verification
 from objreg_ros.registration.gate import surroundings
 from objreg_ros.registration.gate.limits import LIMITS as GATE

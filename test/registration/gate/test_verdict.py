@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Alignment, Reason
+from objreg_ros.data.closures import Alignment, Reason
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.gate.likelihood import odds_of
 from objreg_ros.registration.gate.limits import LIMITS

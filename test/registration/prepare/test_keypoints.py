@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics, View
+from objreg_ros.data.frames import View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.registration.prepare.keypoints import MOST, Keypoints, find_keypoints, match_keypoints
 from registration.rooms import keyframe, seen_from
 

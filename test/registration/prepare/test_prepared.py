@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import AtNeed, PreparedCache, prepare
 from registration.rooms import keyframe, seen_from
 

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, pose, pose_error, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate, ObjectPair
 from objreg_ros.registration.certainty.perturbation import turned_about
 from objreg_ros.registration.kernels.same_pose import AGREEING, STARTS, near
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.propose import competing_hypotheses as module
 from objreg_ros.registration.propose.competing_hypotheses import _grid, competing_poses

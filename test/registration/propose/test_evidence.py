@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.certainty.observability import DOUBTFUL_SIGMA_M
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.propose import evidence
 from objreg_ros.registration.propose.evidence import (

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import UNNAMED
+from objreg_ros.data.frames import UNNAMED
 from objreg_ros.geometry import inverse, is_rigid, pose_error, rotate, transform
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.prepare.fpfh import Features
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.propose import hypotheses

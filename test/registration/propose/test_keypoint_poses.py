@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, is_rigid, pose_error
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair, prepare
 from objreg_ros.registration.propose.keypoint_poses import LEAST_MATCHES, from_keypoints
 from registration.rooms import keyframe, seen_from

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import ObjectPair
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.propose import object_poses
 from objreg_ros.registration.propose.object_poses import _drawn, from_shapes, half_turned, register_scenes

@@ -10,7 +10,7 @@ import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.keyframes.odometry import TravelledPath
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.propose import prior as prior_module
 from objreg_ros.registration.propose.prior import Prior, expect
 from registration.samples import keyframe, moved

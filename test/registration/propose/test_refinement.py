@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Verification
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.propose.refinement import refine
 from objreg_ros.registration.refine.batch_icp import settle

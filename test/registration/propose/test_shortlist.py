@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.certainty.gravity_update import POSE_SIGMA_DEG
 from objreg_ros.registration.keyframe import Context, Keyframe
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair, prepare
 from objreg_ros.registration.propose.evidence import FINISHED_MARGIN
 from objreg_ros.registration.propose.hypotheses import Hypothesis

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.kernels.projection import between, project
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.prepare.views import SHADELESS
 from objreg_ros.registration.refine.photometric_icp import _add_grey, finish

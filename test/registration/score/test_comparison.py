@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Verification
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.score import comparison
 from objreg_ros.registration.score.comparison import LocalScore, score_gain, score_locally

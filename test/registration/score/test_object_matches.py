@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import View
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import inverse, pose
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.propose.evidence import NEARBY_M
 from objreg_ros.registration.score.object_matches import is_gone, match_objects, score_matched_silhouettes

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array
+from objreg_ros.data.checked import Array
 from objreg_ros.registration.prepare.views import Sight, own_pixels, pixels_of
 from objreg_ros.registration.score.surroundings import verify_surroundings, without
 from objreg_ros.registration.score.view_score import verify

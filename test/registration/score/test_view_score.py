@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, View
+from objreg_ros.data.checked import Array
+from objreg_ros.data.frames import View
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.registration.prepare.views import Sight, prepare_sight
 from objreg_ros.registration.score import view_score as verify_module

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import ObjectCloud
+from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.registration.prepare.prepared import SHAPE_POINTS
 from objreg_ros.registration.shapes import symmetry
 from objreg_ros.registration.shapes.shape import prepare_shape

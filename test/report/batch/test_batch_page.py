@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from objreg_ros.report.batch.batch_page import batch_page, totals
-from objreg_ros.report.batch.batch_rows import Row
+from objreg_tools.report.batch.batch_page import batch_page, totals
+from objreg_tools.report.batch.batch_rows import Row
 
 GOOD = Row("a", "/a", "a.json", frames=9, constraints=4, false=1, rejected={"slack": 3}, stage_p50_ms={"detect": 2.0})
 BLIND = Row("b", "/b", "b.json", frames=1, constraints=2, rejected={"slack": 4}, stage_p50_ms={"detect": 4.0})

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from objreg_ros.report.batch.batch_rows import Row
+from objreg_tools.report.batch.batch_rows import Row
 
 TRUTH = {"strict": 1, "loose": 2, "false": 3, "count": 6}
 SUMMARY = {

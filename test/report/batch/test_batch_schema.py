@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.report.batch.batch_page import batch_page
-from objreg_ros.report.batch.batch_rows import Row
-from objreg_ros.report.batch.batch_schema import require_result
-from objreg_ros.report.batch.batch_tables import batch_tables
+from objreg_tools.report.batch.batch_page import batch_page
+from objreg_tools.report.batch.batch_rows import Row
+from objreg_tools.report.batch.batch_schema import require_result
+from objreg_tools.report.batch.batch_tables import batch_tables
 
 ENDS = {"from_ns": 2, "to_ns": 1, "T_from_to": np.eye(4).tolist(), "evidence": {"score": 0.5, "rmse": float("nan")}}
 RESULT: dict[str, Any] = {

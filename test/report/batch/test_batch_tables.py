@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from objreg_ros.report.batch.batch_rows import Row
-from objreg_ros.report.batch.batch_tables import batch_tables
+from objreg_tools.report.batch.batch_rows import Row
+from objreg_tools.report.batch.batch_tables import batch_tables
 
 POSE = np.eye(4).tolist()
 ENDS = {"from_ns": 1, "to_ns": 2, "T_from_to": POSE, "evidence": {"odds": 3.0}}

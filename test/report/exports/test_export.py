@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from registration.samples import box, keyframe, moved
 
-from objreg_ros.data import LoopClosure
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.report.exports.export import export
+from objreg_tools.report.exports.export import export
 from report.ply_reader import positions, read_ply
 
 
@@ -112,7 +112,7 @@ def test_an_export_that_fails_leaves_nothing_half_written(
     if there:
         (tmp_path / "out").mkdir()
     with monkeypatch.context() as patched:
-        patched.setattr("objreg_ros.report.exports.export._write_json", refuse)
+        patched.setattr("objreg_tools.report.exports.export._write_json", refuse)
         with pytest.raises(OSError, match="no space left"):
             list(export(tmp_path / "place.db", tmp_path / "out"))
     assert (tmp_path / "out").exists() == there and not list(tmp_path.glob("out/*"))

@@ -16,9 +16,9 @@ from objreg_ros.geometry import transform
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.report.exports.map_files import MapFiles
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.truth import Truth
+from objreg_tools.report.exports.map_files import MapFiles
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.truth import Truth
 from report.ply_reader import positions, read_ply
 from report.runs import COUNT, TRUE, TRUTH, summary
 
@@ -103,10 +103,10 @@ def test_a_map_that_is_bent_bends_its_cloud(tmp_path: Path) -> None:
         "covariance": np.diag([1e-6] * 6).tolist(),
         "labels": [],
     }
-    story = RunSummary.of("back", {"glimpses": glimpses, "constraints": [closure]}, Truth([]))
+    run = RunSummary.of("back", {"glimpses": glimpses, "constraints": [closure]}, Truth([]))
     mark = cloud("cup", np.array([[0.0, 0.0, 1.0]]), rgb=np.uint8([[255, 0, 0]]))
     store = store_of(tmp_path / "place.db", taken(1, 0.0, mark), taken(2, last, mark, x=way[-1]))
-    MapFiles(cloud=tmp_path / "map.ply").write(story, store)
+    MapFiles(cloud=tmp_path / "map.ply").write(run, store)
     table = read_ply(tmp_path / "map.ply")
     red = positions(table)[(table["red"] > 200) & (table["green"] < 50)]
     assert way[-1] > 0.04 and np.ptp(red, axis=0).max() < 0.025
@@ -137,10 +137,10 @@ def test_keyframes_of_our_own_tracking_are_on_its_map_and_those_of_odometry_are_
     rows = [
         {"stamp_ns": k * SECOND, "tracked": {"session": 4, "T_session_camera": moved(k).tolist()}} for k in range(3)
     ]
-    story = RunSummary.of("straight", {"glimpses": rows, "constraints": [], "odometry": "tracked"}, Truth([]))
+    run = RunSummary.of("straight", {"glimpses": rows, "constraints": [], "odometry": "tracked"}, Truth([]))
     store = store_of(tmp_path / "a.db", replace(taken(1, 1.0), by_odometry=False), taken(2, 2.0))
     told: list[str] = []
-    MapFiles(tum=tmp_path / "way.tum", cloud=tmp_path / "map.ply").write(story, store, told.append)
+    MapFiles(tum=tmp_path / "way.tum", cloud=tmp_path / "map.ply").write(run, store, told.append)
     assert told[1] == "1 keyframes of the store are not on the map: they are of another run, or not of the trajectory"
     assert len(read_ply(tmp_path / "map.ply")) > 1000 and len(rows_of(tmp_path / "way.tum")) == 3
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.report.exports.mcap_file import write_mcap
+from objreg_ros.bridge.messages import from_msg, headers
+from objreg_tools.report.exports.mcap_file import write_mcap
 from report.runs import COUNT, STEP_NS
 from report.scenes import SEEN, walk
 
@@ -35,8 +35,8 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list]:
 
 def test_the_three_ways_are_paths(read: dict[str, list]) -> None:
     scene = walk()
-    for name, way in scene.ways.items():
-        (path,) = read[f"/way/{name}"]
+    for name, way in scene.trajectories.items():
+        (path,) = read[f"/trajectory/{name}"]
         places = np.array([[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses])
         assert path.header.frame_id == "map" and np.allclose(places, way.positions)
 
@@ -47,7 +47,7 @@ def test_closures_are_lines_by_verdict_with_their_errors_beside_them(read: dict[
     words = [marker.text for marker in array.markers if marker.text]
     edges = walk().edges
     assert lines == {v: sum(e.verdict == v for e in edges) for v in {edge.verdict for edge in edges}}
-    assert "false" in lines and words == [edge.words for edge in edges]
+    assert "false" in lines and words == [edge.text for edge in edges]
 
 
 def test_objects_are_where_they_were_seen(read: dict[str, list]) -> None:
@@ -74,7 +74,7 @@ def test_the_camera_goes_through_the_map_with_what_it_saw(read: dict[str, list])
     assert (stamped.header.frame_id, stamped.child_frame_id) == ("map", "camera")
     assert stamped.transform.translation.x == pytest.approx(walk().main.positions[30][0])
     image, cloud, info = (read[f"/camera/{name}"][1] for name in ("image/compressed", "points", "camera_info"))
-    assert from_msg.stamp_ns(image) == from_msg.stamp_ns(cloud) == 30 * STEP_NS
+    assert headers.stamp_ns(image) == headers.stamp_ns(cloud) == 30 * STEP_NS
     assert cv2.imdecode(image.data, cv2.IMREAD_COLOR).shape == (info.height, info.width, 3)
     points = from_msg.point_cloud(cloud)
     assert np.allclose(points.xyz[..., 2], 2.0) and (points.rgb == (200, 10, 20)).all()
@@ -84,7 +84,7 @@ def test_what_cannot_be_finished_leaves_nothing(tmp_path: Path, monkeypatch: pyt
     def full(*words: object) -> None:
         raise OSError("no space left")
 
-    monkeypatch.setattr("objreg_ros.report.exports.mcap_file.write_rosbag2", full)
+    monkeypatch.setattr("objreg_tools.report.exports.mcap_file.write_rosbag2", full)
     with pytest.raises(OSError, match="no space"):
         write_mcap(tmp_path / "run.mcap", walk())
     assert not list(tmp_path.iterdir())

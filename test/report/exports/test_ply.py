@@ -10,7 +10,7 @@ import open3d
 import pytest
 from registration.samples import box
 
-from objreg_ros.report.exports.ply import write_ply
+from objreg_tools.report.exports.ply import write_ply
 from report.ply_reader import positions, read_ply
 
 

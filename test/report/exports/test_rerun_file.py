@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from objreg_ros.report.exports.rerun_file import write_rerun
+from objreg_tools.report.exports.rerun_file import write_rerun
 from report.runs import STEP_NS
 from report.scenes import SEEN, walk
 
@@ -38,8 +38,8 @@ def rows(batch: Any) -> list[dict]:
 
 
 def test_the_three_ways_are_lines(read: dict[str, list[dict]]) -> None:
-    for name, way in walk().ways.items():
-        (row,) = read[f"/map/ways/{name}"]
+    for name, way in walk().trajectories.items():
+        (row,) = read[f"/map/trajectories/{name}"]
         assert np.allclose(row["LineStrips3D:strips"][0], way.positions, atol=1e-5)
         assert row["LineStrips3D:labels"] == [name]
 
@@ -50,7 +50,7 @@ def test_closures_are_lines_by_verdict_with_their_labels_and_errors(read: dict[s
         (row,) = read[f"/map/closures/{verdict}"]
         of = [edge for edge in edges if edge.verdict == verdict]
         assert np.allclose(row["LineStrips3D:strips"], [edge.ends for edge in of], atol=1e-5)
-        assert row["LineStrips3D:labels"] == [edge.words for edge in of]
+        assert row["LineStrips3D:labels"] == [edge.text for edge in of]
 
 
 def test_objects_are_points_by_label(read: dict[str, list[dict]]) -> None:

@@ -6,15 +6,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.report.exports.run_scene import MOST_POINTS, WIDTH, scene_of
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.truth import Truth
+from objreg_tools.report.exports.run_scene import MOST_POINTS, WIDTH, scene_of
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.truth import Truth
 from report.runs import COUNT, STEP_NS, TRUE, TRUTH, summary
 from report.scenes import SEEN, FewPictures, walk
 
 
 def test_three_ways_are_in_one_frame() -> None:
-    ways = walk(false=False).ways
+    ways = walk(false=False).trajectories
     assert list(ways) == ["odometry", "corrected", "true"] and all(len(way.stamps_ns) == COUNT for way in ways.values())
     assert np.allclose(ways["odometry"].poses[0], np.eye(4))
     pytest.importorskip("gtsam")
@@ -27,8 +27,8 @@ def test_closures_have_their_places_and_their_true_error() -> None:
     scene = walk()
     verdicts = [edge.verdict for edge in scene.edges]
     assert verdicts.count("false") == 1 and len(verdicts) == 5
-    assert scene.edges[0].words == "cup, book: off by 0.0°, 0.0 cm"
-    assert np.array_equal(scene.edges[0].ends[0], scene.ways["corrected"].positions[5])
+    assert scene.edges[0].text == "cup, book: off by 0.0°, 0.0 cm"
+    assert np.array_equal(scene.edges[0].ends[0], scene.trajectories["corrected"].positions[5])
 
 
 def test_moments_are_thinned_and_those_without_a_picture_are_passed_over() -> None:
@@ -45,7 +45,7 @@ def test_without_odometry_the_truth_is_shown() -> None:
     told = summary()
     told["glimpses"] = [{"stamp_ns": row["stamp_ns"]} for row in told["glimpses"]]
     scene = scene_of(RunSummary.of("walk", told, TRUTH), FewPictures())  # type: ignore[arg-type]
-    assert list(scene.ways) == ["true"] and scene.objects == () and len(scene.edges) == 4
+    assert list(scene.trajectories) == ["true"] and scene.objects == () and len(scene.edges) == 4
     assert np.allclose(scene.main.poses[7], TRUE[7])
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.report.exports.scene_files import SceneFiles
+from objreg_tools.report.exports.scene_files import SceneFiles
 from report.scenes import walk
 
 

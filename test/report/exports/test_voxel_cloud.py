@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.report.exports import voxel_cloud
-from objreg_ros.report.exports.voxel_cloud import VoxelCloud
+from objreg_tools.report.exports import voxel_cloud
+from objreg_tools.report.exports.voxel_cloud import VoxelCloud
 
 HERE = np.eye(4)
 QUARTER_LEFT = pose(rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])), np.array([10.0, 0.0, 0.0]))

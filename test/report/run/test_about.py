@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.report.run.about import about, commit, version
+from objreg_tools.report.run.about import about, commit, version
 
 
 def test_a_run_tells_what_it_was_made_with(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from objreg_ros.data import Detections
-from objreg_ros.report.run.average_precision import TrueBoxes, average_precision
+from objreg_ros.data.images import Detections
+from objreg_tools.report.run.average_precision import TrueBoxes, average_precision
 
 A, B, FAR = (0, 0, 10, 10), (20, 0, 30, 10), (50, 50, 60, 60)
 

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from objreg_ros.data import LoopClosure
+from objreg_mapper.params import MapperParams
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.mapper.params import MapperParams
-from objreg_ros.report.run.camera_map import CameraMap, TrackedFrame, with_sessions
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.report.run.camera_map import CameraMap, TrackedFrame, with_sessions
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 from report.runs import COUNT, STEP_NS, TRUE
 
 DRIFT = pose(rotation_from_vector(np.array([0.0, 0.0, 0.004])), np.array([0.002, 0.0, 0.0]))

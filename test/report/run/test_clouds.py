@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from objreg_ros.data import DepthImage
-from objreg_ros.report.run.clouds import LEFT_OUT, MOST_POINTS, clouds, thinned
-from objreg_ros.report.run.pairs import pairs_of
-from objreg_ros.report.run.run_summary import RunSummary
+from objreg_ros.data.images import DepthImage
+from objreg_tools.report.run.clouds import LEFT_OUT, MOST_POINTS, clouds, thinned
+from objreg_tools.report.run.pairs import pairs_of
+from objreg_tools.report.run.run_summary import RunSummary
 from report.run.test_thumbnails import RGB, SEEN, Wall
 from report.runs import STEP_NS, TRUE, TRUTH, closure, refusal, summary
 from report.test_packed import unpacked

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from objreg_ros.report.page import page
-from objreg_ros.report.run.comparison import KEYFRAME_NS, comparison, matched, names_of
-from objreg_ros.report.run.run_summary import RunSummary
+from objreg_tools.report.page import page
+from objreg_tools.report.run.comparison import KEYFRAME_NS, comparison, matched, names_of
+from objreg_tools.report.run.run_summary import RunSummary
 from report.runs import TRUTH, closure, refusal, summary
 
 
@@ -26,16 +26,16 @@ def test_runs_are_named_by_what_differs_between_them() -> None:
 
 
 def test_constraints_are_the_same_within_the_time_of_a_keyframe() -> None:
-    stories = [RunSummary.of("walk", {**summary(), "constraints": rows}, TRUTH) for rows in (
+    all_runs = [RunSummary.of("walk", {**summary(), "constraints": rows}, TRUTH) for rows in (
         [closure(5, 65), closure(20, 80), closure(40, 100)],
         [closure(20 + KEYFRAME_NS // 10**8, 80), closure(40, 112), closure(6, 64)],
     )]  # fmt: skip
-    assert matched(stories[0].closures, stories[1].closures) == {0: 2, 1: 0}
+    assert matched(all_runs[0].closures, all_runs[1].closures) == {0: 2, 1: 0}
 
 
 def test_a_constraint_is_matched_once_with_the_nearest() -> None:
-    story = RunSummary.of("walk", {**summary(), "constraints": [closure(20, 80), closure(21, 81)]}, TRUTH)
-    assert matched(story.closures, story.closures[1:]) == {1: 0}
+    run = RunSummary.of("walk", {**summary(), "constraints": [closure(20, 80), closure(21, 81)]}, TRUTH)
+    assert matched(run.closures, run.closures[1:]) == {1: 0}
 
 
 def test_what_was_gained_and_lost_is_told_with_what_became_of_it() -> None:

@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from objreg_ros.report.run import figures
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.truth import Truth
+from objreg_tools.report.run import figures
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.truth import Truth
 from report.runs import STEP_NS, TRUE, TRUTH, closure, summary, with_a_stray
 
 STORY = RunSummary.of("walk", summary(false=True), TRUTH)
@@ -22,7 +22,7 @@ def count(svg: str, style: str) -> int:
 
 
 def test_the_way_shows_three_lines_and_a_link_a_closure() -> None:
-    svg = figures.way(STORY, STORY.tracks().stamps_ns, STORY.tracks().lines)
+    svg = figures.trajectory(STORY, STORY.tracks().stamps_ns, STORY.tracks().lines)
     assert [count(svg, style) for style in ("true", "odometry", "corrected", "link", "false")] == [1, 1, 1, 5, 1]
     assert "off by 0.0° and 50.0 cm" in svg
 
@@ -30,7 +30,7 @@ def test_the_way_shows_three_lines_and_a_link_a_closure() -> None:
 def test_the_closures_of_a_run_without_odometry_are_drawn_on_the_true_way() -> None:
     blind = RunSummary.of("blind", {**summary(), "glimpses": []}, TRUTH)
     stamps_ns, true = blind.true_trajectory()
-    svg = figures.way(blind, stamps_ns, {"true": true})
+    svg = figures.trajectory(blind, stamps_ns, {"true": true})
     assert [count(svg, style) for style in ("true", "odometry", "link")] == [1, 0, 4]
 
 
@@ -42,8 +42,8 @@ def test_a_drawing_for_a_telephone_has_letters_of_the_same_size_in_less_width() 
 
 def test_a_closure_tells_what_had_moved() -> None:
     told = {**closure(0, 60), "evidence": {"score": 0.8, "moved soda_can [m]": 0.412}}
-    story = RunSummary.of("walk", {**summary(), "constraints": [told]}, TRUTH)
-    assert figures.closure_words(story, story.closures[0]).endswith(
+    run = RunSummary.of("walk", {**summary(), "constraints": [told]}, TRUTH)
+    assert figures.closure_text(run, run.closures[0]).endswith(
         "cup, book, soda can moved by 0.41 m, off by 0.0° and 0.0 cm"
     )
 
@@ -63,13 +63,13 @@ def test_the_timeline_has_a_dot_a_refusal_and_a_row_a_reason() -> None:
 def test_the_timeline_and_the_error_are_of_the_run_without_what_is_of_another_time() -> None:
     stray_ns = -1_700_000_000 * 10**9
     known = Truth([(stray_ns, TRUE[0]), *((k * STEP_NS, T) for k, T in enumerate(TRUE))])
-    story = RunSummary.of("walk", with_a_stray(stray_ns), known)
-    svg = figures.timeline(story)
+    run = RunSummary.of("walk", with_a_stray(stray_ns), known)
+    svg = figures.timeline(run)
     assert count(svg, "refused") == 3 and "ghost," not in svg
     bars = [child for child in ElementTree.fromstring(svg) if "seen" in (child.get("class") or "").split()]
     assert max(float(bar.get("width", 0)) for bar in bars) > 20
-    assert stray_ns in story.tracks().stamps_ns
-    (line, _) = re.findall(r'points="([^"]+)"', figures.error_over_time(story, story.tracks()))
+    assert stray_ns in run.tracks().stamps_ns
+    (line, _) = re.findall(r'points="([^"]+)"', figures.error_over_time(run, run.tracks()))
     assert len({point.split(",")[0] for point in line.split()}) == len(TRUE)
 
 
@@ -81,13 +81,13 @@ def test_the_map_names_every_object_once() -> None:
 
 def test_heaps_of_one_label_are_told_apart_and_strays_have_no_name() -> None:
     xy = np.array([[0.0, 0.0]] * 5 + [[3.0, 0.0]] * 5 + [[9.0, 9.0]])
-    assert [tuple(place) for _, place in figures.heaps(["cup"] * 11, xy)] == [(0.0, 0.0), (3.0, 0.0)]
+    assert [tuple(place) for _, place in figures.clusters(["cup"] * 11, xy)] == [(0.0, 0.0), (3.0, 0.0)]
 
 
 def test_heaps_of_a_long_run_need_no_more_memory_than_its_sightings() -> None:
     xy = np.random.default_rng(0).normal(0.0, 0.05, (5000, 2))
     tracemalloc.start()
-    (heap,) = figures.heaps(["cup"] * len(xy), xy)
+    (heap,) = figures.clusters(["cup"] * len(xy), xy)
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert heap[0] == "cup" and np.abs(heap[1]).max() < 0.01

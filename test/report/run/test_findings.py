@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from recording.folders import records, tum_folder
+from recording.sample_folders import records, tum_folder
 
 from objreg_ros.plausibility.finding import Finding
-from objreg_ros.recording import open_recording, write_rosbag2
-from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.report.run.findings import as_json, find, setting, verdict
+from objreg_tools.recording import open_recording, write_rosbag2
+from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.report.run.findings import as_json, find, setting, verdict
 
 EMPTY: dict[str, Any] = {"frames": 40, "detections": 30, "objects": 20, "constraints": [], "rejected": {}}
 CLOSED = {**EMPTY, "constraints": [{}], "truth": {"count": 0}}

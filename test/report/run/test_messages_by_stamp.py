@@ -8,11 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from recording.folders import CAMERA, STEP_NS, records, uncalibrated
+from recording.sample_folders import CAMERA, STEP_NS, records, uncalibrated
 
-from objreg_ros.bridge.messages import from_msg
-from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
-from objreg_ros.report.run.messages_by_stamp import SLOP_NS, Cameras, MessagesByStamp
+from objreg_ros.bridge.messages import camera_from_msg, headers
+from objreg_tools.recording import Record, open_recording, write_rosbag2
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.report.run.messages_by_stamp import SLOP_NS, Cameras, MessagesByStamp
 
 FIRST_NS = 10**9
 
@@ -27,18 +28,18 @@ def recorded(path: Path, late_ns: int, told: Iterable[Record] | None = None) -> 
 @pytest.mark.parametrize("late_ms", [0, 120, 200, 1000, -300, 3 * 365 * 86_400_000])
 def test_a_message_is_found_by_its_stamp_whenever_it_was_recorded(tmp_path: Path, late_ms: int) -> None:
     with open_recording(recorded(tmp_path / "bag", late_ms * 1_000_000)) as recording:
-        shelf = MessagesByStamp(recording, "/depth/image")
+        messages = MessagesByStamp(recording, "/depth/image")
         for k in (0, 7, 29):
-            found = shelf.nearest(FIRST_NS + k * STEP_NS + 1_000_000)
-            assert found is not None and from_msg.stamp_ns(found) == FIRST_NS + k * STEP_NS
+            found = messages.nearest(FIRST_NS + k * STEP_NS + 1_000_000)
+            assert found is not None and headers.stamp_ns(found) == FIRST_NS + k * STEP_NS
 
 
 @pytest.mark.parametrize("late_ms", [0, 200])
 def test_what_is_further_from_a_moment_than_the_slop_is_not_it(tmp_path: Path, late_ms: int) -> None:
     with open_recording(recorded(tmp_path / "bag", late_ms * 1_000_000)) as recording:
-        shelf = MessagesByStamp(recording, "/depth/image")
-        assert shelf.nearest(FIRST_NS - SLOP_NS - 1) is None and shelf.nearest(FIRST_NS - SLOP_NS) is not None
-        assert shelf.nearest(10**15) is None and MessagesByStamp(recording, "/nothing").nearest(FIRST_NS) is None
+        messages = MessagesByStamp(recording, "/depth/image")
+        assert messages.nearest(FIRST_NS - SLOP_NS - 1) is None and messages.nearest(FIRST_NS - SLOP_NS) is not None
+        assert messages.nearest(10**15) is None and MessagesByStamp(recording, "/nothing").nearest(FIRST_NS) is None
 
 
 def test_messages_whose_stamp_cannot_be_read_are_passed_over_and_counted(tmp_path: Path) -> None:
@@ -49,9 +50,9 @@ def test_messages_whose_stamp_cannot_be_read_are_passed_over_and_counted(tmp_pat
             return iter(replace(r, encode=lambda: b"") if r.stamp_ns == FIRST_NS else r for r in whole(*asked))
 
         recording.records = broken
-        shelf = MessagesByStamp(recording, "/depth/image")
-        assert shelf.nearest(FIRST_NS) is None and shelf.unreadable == 1
-        assert shelf.nearest(FIRST_NS + STEP_NS) is not None
+        messages = MessagesByStamp(recording, "/depth/image")
+        assert messages.nearest(FIRST_NS) is None and messages.unreadable == 1
+        assert messages.nearest(FIRST_NS + STEP_NS) is not None
 
 
 def info(stamp_ns: int, fx: float) -> Record:
@@ -64,7 +65,7 @@ def test_the_camera_is_the_newest_calibrated_one_of_a_moment_or_else_the_first(t
     write_rosbag2(tmp_path / "bag", told)
     with open_recording(tmp_path / "bag") as recording:
         cameras = Cameras(recording, "/camera_info")
-        found = [from_msg.intrinsics(cameras.at(stamp)).fx for stamp in (5, 20, 39, 40, 99)]
+        found = [camera_from_msg.intrinsics(cameras.at(stamp)).fx for stamp in (5, 20, 39, 40, 99)]
     assert found == [50.0, 50.0, 50.0, 60.0, 60.0]
 
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.report.run.pairs import by_interest, pairs_of
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.truth import Truth
+from objreg_tools.report.run.pairs import by_interest, pairs_of
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.truth import Truth
 from report.runs import STEP_NS, TRUTH, closure, refusal, summary
 
 STORY = RunSummary.of("walk", summary(false=True), TRUTH)
@@ -24,9 +24,9 @@ def test_every_constraint_and_every_refusal_is_a_pair() -> None:
 def test_a_pair_tells_its_error_where_truth_does() -> None:
     pair = pairs_of(STORY)[4]
     assert pair.error == pytest.approx((0.0, 50.0), abs=1e-4)
-    assert "In truth 120° and 1.7 m apart; the pose is off by 0.0° and 50.0 cm." in pair.words
+    assert "In truth 120° and 1.7 m apart; the pose is off by 0.0° and 50.0 cm." in pair.text
     unjudged = pairs_of(RunSummary.of("walk", summary(), Truth([])))[0]
-    assert unjudged.error is None and unjudged.words == ""
+    assert unjudged.error is None and unjudged.text == ""
 
 
 def test_the_labels_of_a_refusal_are_those_detected_at_both_moments() -> None:
@@ -40,8 +40,8 @@ def test_the_labels_of_a_refusal_are_those_detected_at_both_moments() -> None:
 def test_what_was_refused_says_why_and_what_moved_says_so() -> None:
     moved = {**closure(5, 65), "evidence": {"moved cup [m]": 0.4}}
     pairs = pairs_of(RunSummary.of("walk", {**summary(), "constraints": [moved]}, TRUTH))
-    assert pairs[0].words.startswith("cup moved by 0.40 m. In truth")
-    assert pairs[2].words.startswith("0.3 < 0.5 & texture_disagrees. In truth")
+    assert pairs[0].text.startswith("cup moved by 0.40 m. In truth")
+    assert pairs[2].text.startswith("0.3 < 0.5 & texture_disagrees. In truth")
 
 
 def test_false_constraints_are_looked_at_first_and_what_was_not_tried_last() -> None:

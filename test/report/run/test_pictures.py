@@ -8,16 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording.folders import STEP_NS, records, static, tum_folder, uncalibrated
+from recording.sample_folders import STEP_NS, records, static, tum_folder, uncalibrated
 
 from objreg_ros.bridge.messages.layout import VIEW
-from objreg_ros.data import DepthImage, Detections, Intrinsics
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.geometry import pose
-from objreg_ros.recording import Record, messages, write_rosbag2
-from objreg_ros.recording.inputs import Inputs, choose_inputs
-from objreg_ros.recording.opening import open_recording
-from objreg_ros.report.run.pictures import WIDTH, Album, chosen_closures, chosen_refusals, data_uri, overlay
-from objreg_ros.report.run.run_summary import RunSummary
+from objreg_tools.recording import Record, write_rosbag2
+from objreg_tools.recording.inputs import Inputs, choose_inputs
+from objreg_tools.recording.opening import open_recording
+from objreg_tools.recording.rosbag import messages
+from objreg_tools.report.run.pictures import WIDTH, Album, chosen_closures, chosen_refusals, data_uri, overlay
+from objreg_tools.report.run.run_summary import RunSummary
 from report.runs import TRUTH, summary
 
 CAMERA = Intrinsics(fx=300.0, fy=300.0, cx=159.5, cy=119.5, width=WIDTH, height=240)
@@ -49,10 +50,10 @@ def test_what_only_one_saw_stays_dark() -> None:
 
 
 def test_false_closures_are_shown_first() -> None:
-    story = RunSummary.of("walk", summary(false=True), TRUTH)
-    shown = chosen_closures(story, most=3)
-    assert story.is_false(shown[0]) and len(shown) == 3
-    assert not any(story.is_false(closure) for closure in shown[1:])
+    run = RunSummary.of("walk", summary(false=True), TRUTH)
+    shown = chosen_closures(run, most=3)
+    assert run.is_false(shown[0]) and len(shown) == 3
+    assert not any(run.is_false(closure) for closure in shown[1:])
 
 
 def test_only_what_was_tried_is_shown_as_refused() -> None:

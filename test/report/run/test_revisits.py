@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics, LoopClosure, View
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.frames import View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.report.run.revisits import Seen, closed, overlap, recall_by_view_change, revisit_of, revisits
-from objreg_ros.truth import Truth
+from objreg_tools.report.run.revisits import Seen, closed, overlap, recall_by_view_change, revisit_of, revisits
+from objreg_tools.truth import Truth
 
 CAMERA = Intrinsics(fx=150.0, fy=150.0, cx=79.5, cy=59.5, width=160, height=120)
 SECOND = 1_000_000_000

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.report.run.rows import Glimpse, advancing, glimpse_of, read_rows
+from objreg_tools.report.run.rows import Glimpse, advancing, glimpse_of, read_rows
 from report.runs import tracked
 
 

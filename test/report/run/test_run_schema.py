@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from objreg_ros.report.run.run_schema import require_form
+from objreg_tools.report.run.run_schema import require_form
 from report.runs import summary
 
 BAD: list[tuple[str, Any]] = [

@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.truth import Truth
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.truth import Truth
 from report.runs import COUNT, TRUE, TRUTH, summary, tracked, with_a_stray
 
 
@@ -21,9 +21,9 @@ def test_closures_bend_the_way_back_to_the_truth() -> None:
 
 
 def test_a_false_closure_is_known_by_the_truth_and_pruned_by_the_map() -> None:
-    story = RunSummary.of("walk", summary(false=True), TRUTH)
-    assert [story.is_false(closure) for closure in story.closures] == [False] * 4 + [True]
-    assert story.pruned == story.closures[-1:]
+    run = RunSummary.of("walk", summary(false=True), TRUTH)
+    assert [run.is_false(closure) for closure in run.closures] == [False] * 4 + [True]
+    assert run.pruned == run.closures[-1:]
 
 
 def test_every_frame_is_on_the_way_of_a_camera_at_rest_too() -> None:
@@ -80,17 +80,17 @@ def test_a_frame_without_a_rigid_pose_is_refused_by_the_name_of_its_run(pose: li
 
 
 def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:
-    story = RunSummary.of("walk", summary(false=True), Truth([]))
-    assert not any(story.is_false(closure) for closure in story.closures)
-    assert story.tracks().true is None and story.tracks().corrected_error is None
+    run = RunSummary.of("walk", summary(false=True), Truth([]))
+    assert not any(run.is_false(closure) for closure in run.closures)
+    assert run.tracks().true is None and run.tracks().corrected_error is None
 
 
 def test_without_odometry_there_are_no_tracks_and_no_object_map() -> None:
     told = summary()
     for row in told["glimpses"]:
         row["T_odom_camera"] = None
-    story = RunSummary.of("walk", told, TRUTH)
-    assert story.tracks() is None and story.objects() == []
+    run = RunSummary.of("walk", told, TRUTH)
+    assert run.tracks() is None and run.objects() == []
 
 
 def test_one_object_is_one_place_in_the_map_and_several_by_odometry() -> None:
@@ -103,27 +103,27 @@ def test_frames_whose_time_does_not_advance_are_left_out_and_counted() -> None:
     told = summary()
     again = [dict(told["glimpses"][k]) for k in (119, 7, 0)]
     early = {**again[0], "stamp_ns": -5}
-    story = RunSummary.of("walk", {**told, "glimpses": [*told["glimpses"], *again, early]}, TRUTH)
+    run = RunSummary.of("walk", {**told, "glimpses": [*told["glimpses"], *again, early]}, TRUTH)
     once = RunSummary.of("walk", told, TRUTH)
-    assert (once.left_out, story.left_out) == (0, 4)
-    np.testing.assert_array_equal(story.tracks().corrected, once.tracks().corrected)
-    assert len(story.objects()) == len(once.objects())
+    assert (once.left_out, run.left_out) == (0, 4)
+    np.testing.assert_array_equal(run.tracks().corrected, once.tracks().corrected)
+    assert len(run.objects()) == len(once.objects())
 
 
 def test_an_older_json_without_frames_is_told_all_the_same() -> None:
     told = {key: value for key, value in summary().items() if key not in ("glimpses", "refusals")}
-    story = RunSummary.of("walk", told, TRUTH)
-    assert len(story.closures) == 4 and story.tracks() is None
-    assert story.seconds(story.closures[0].to_ns) == pytest.approx(6.0)
+    run = RunSummary.of("walk", told, TRUTH)
+    assert len(run.closures) == 4 and run.tracks() is None
+    assert run.seconds(run.closures[0].to_ns) == pytest.approx(6.0)
 
 
 def test_labels_read_as_words() -> None:
     told = summary()
     told["constraints"][0]["labels"] = ["cereal_box"]
     told["glimpses"][0] |= {"labels": ["soda_can"], "objects": [["soda_can", [0.0, 0.0, 1.0]]]}
-    story = RunSummary.of("walk", told, TRUTH)
-    assert story.closures[0].labels == ("cereal box",) and story.glimpses[0].labels == ("soda can",)
-    assert story.glimpses[0].objects[0][0] == "soda can"
+    run = RunSummary.of("walk", told, TRUTH)
+    assert run.closures[0].labels == ("cereal box",) and run.glimpses[0].labels == ("soda can",)
+    assert run.glimpses[0].objects[0][0] == "soda can"
 
 
 def test_the_pose_that_was_refused_is_told_where_there_was_one() -> None:
@@ -136,17 +136,17 @@ def test_the_pose_that_was_refused_is_told_where_there_was_one() -> None:
 
 def test_without_the_solver_the_way_is_that_of_odometry_and_the_story_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gtsam", None)
-    story = RunSummary.of("walk", summary(), TRUTH)
-    assert "expected gtsam" in story.map.unsolved and not story.pruned
-    tracks = story.tracks()
+    run = RunSummary.of("walk", summary(), TRUTH)
+    assert "expected gtsam" in run.map.unsolved and not run.pruned
+    tracks = run.tracks()
     np.testing.assert_allclose(tracks.corrected, tracks.odometry, atol=1e-3)
 
 
 @pytest.mark.parametrize("years", [-54, 3])
 def test_a_frame_of_another_time_does_not_stretch_the_run_and_is_counted(years: int) -> None:
-    story = RunSummary.of("walk", with_a_stray(years * 31_536_000 * 10**9), TRUTH)
-    assert story.stretch_ns == (0, TRUTH.stamps_ns[-1]) and story.seconds(10**9) == 1.0
-    assert story.out_of_time == {"frames": 1, "refusals": 1}
+    run = RunSummary.of("walk", with_a_stray(years * 31_536_000 * 10**9), TRUTH)
+    assert run.stretch_ns == (0, TRUTH.stamps_ns[-1]) and run.seconds(10**9) == 1.0
+    assert run.out_of_time == {"frames": 1, "refusals": 1}
     assert RunSummary.of("walk", summary(), TRUTH).out_of_time == {}
 
 
@@ -154,31 +154,31 @@ def test_a_run_with_a_short_rest_is_one_stretch() -> None:
     told = summary()
     for row in told["glimpses"][60:]:
         row["stamp_ns"] += 3000 * 10**9
-    story = RunSummary.of("walk", told, TRUTH)
-    assert story.out_of_time == {} and story.stretch_ns[1] > 3000 * 10**9
+    run = RunSummary.of("walk", told, TRUTH)
+    assert run.out_of_time == {} and run.stretch_ns[1] > 3000 * 10**9
 
 
 def test_our_own_tracking_is_corrected_as_odometry_is_and_named_as_what_it_is() -> None:
-    story, usual = RunSummary.of("walk", tracked(), TRUTH), RunSummary.of("walk", summary(), TRUTH)
-    tracks, trajectory = story.tracks(), story.trajectory()
+    run, usual = RunSummary.of("walk", tracked(), TRUTH), RunSummary.of("walk", summary(), TRUTH)
+    tracks, trajectory = run.tracks(), run.trajectory()
     assert list(tracks.lines) == ["true", "tracked", "corrected"]
     assert trajectory["of"] == "tracked" and (trajectory["frames"], trajectory["sessions"]) == (COUNT, 1)
     assert trajectory["error_cm"]["after"] < 0.5 * trajectory["error_cm"]["before"]
     assert usual.trajectory()["error_cm"]["before"] == pytest.approx(trajectory["error_cm"]["before"])
-    assert len(story.objects()) == len(usual.objects()) > 0
+    assert len(run.objects()) == len(usual.objects()) > 0
 
 
 def test_of_a_track_that_was_lost_the_largest_part_is_on_the_map() -> None:
     told = tracked(begins=45)  # closures tie 40 to 100, but one alone ties no session
     told["constraints"] = [row for row in told["constraints"] if row["from_ns"] == 40 * 100_000_000]
-    story = RunSummary.of("walk", told, TRUTH)
-    trajectory = story.trajectory()
+    run = RunSummary.of("walk", told, TRUTH)
+    trajectory = run.trajectory()
     assert (trajectory["frames"], trajectory["frames_apart"], trajectory["sessions_apart"]) == (75, 45, 1)
-    assert story.left_out == 0 and len(story.tracks().corrected) == 75
+    assert run.left_out == 0 and len(run.tracks().corrected) == 75
     whole = RunSummary.of("walk", tracked(begins=45), TRUTH).trajectory()
     assert (whole["frames"], whole["sessions"], whole["frames_apart"]) == (COUNT, 2, 0)
 
 
 def test_without_an_order_to_track_the_track_is_no_map() -> None:
-    story = RunSummary.of("walk", {**tracked(), "odometry": None}, TRUTH)
-    assert story.tracks() is None and story.trajectory() is None and len(story.tracked_trajectory()[0]) == COUNT
+    run = RunSummary.of("walk", {**tracked(), "odometry": None}, TRUTH)
+    assert run.tracks() is None and run.trajectory() is None and len(run.tracked_trajectory()[0]) == COUNT

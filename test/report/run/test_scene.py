@@ -9,35 +9,35 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.report.run.scene import levelling, scene
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.report.run.scene import levelling, scene
 from report.runs import OBJECTS, TRUTH, summary
 from report.test_packed import unpacked
 
 UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # of a camera that looks along y while z is up
 
 
-def drawn(story: RunSummary) -> dict:
-    tracks = story.tracks()
-    return scene(story, tracks.stamps_ns, tracks.lines, tracks)
+def drawn(run: RunSummary) -> dict:
+    tracks = run.tracks()
+    return scene(run, tracks.stamps_ns, tracks.lines, tracks)
 
 
 def test_the_ways_are_there_by_name() -> None:
-    story = RunSummary.of("walk", summary(), TRUTH)
-    ways = {way["name"]: unpacked(way) for way in drawn(story)["ways"]}
+    run = RunSummary.of("walk", summary(), TRUTH)
+    ways = {way["name"]: unpacked(way) for way in drawn(run)["trajectories"]}
     assert {*ways} == {"truth", "odometry", "corrected"}
-    assert np.allclose(ways["truth"], story.tracks().true, atol=1e-3)
+    assert np.allclose(ways["truth"], run.tracks().true, atol=1e-3)
 
 
 def test_closures_are_told_apart_by_verdict_and_by_what_the_mapper_pruned() -> None:
-    story = RunSummary.of("walk", summary(false=True), TRUTH)
-    story = replace(story, pruned=(story.closures[1], story.closures[4]))
-    groups = {group["name"]: group for group in drawn(story)["closures"]}
+    run = RunSummary.of("walk", summary(false=True), TRUTH)
+    run = replace(run, pruned=(run.closures[1], run.closures[4]))
+    groups = {group["name"]: group for group in drawn(run)["closures"]}
     assert {name: group["keys"] for name, group in groups.items()} == {
         "closure": ["c0", "c2", "c3"], "pruned closure": ["c1"], "pruned false closure": ["c4"]
     }  # fmt: skip
     ends = unpacked(groups["pruned false closure"])
-    assert np.allclose(ends, story.tracks().corrected[[10, 90]], atol=1e-3)
+    assert np.allclose(ends, run.tracks().corrected[[10, 90]], atol=1e-3)
 
 
 def test_objects_are_where_truth_has_them_and_named_once() -> None:
@@ -48,10 +48,10 @@ def test_objects_are_where_truth_has_them_and_named_once() -> None:
 
 
 def test_a_run_without_odometry_has_the_true_way_with_its_closures() -> None:
-    story = RunSummary.of("blind", {**summary(), "glimpses": []}, TRUTH)
-    stamps_ns, true = story.true_trajectory()
-    made = scene(story, stamps_ns, {"true": true}, None)
-    assert [way["name"] for way in made["ways"]] == ["truth"] and made["objects"] == []
+    run = RunSummary.of("blind", {**summary(), "glimpses": []}, TRUTH)
+    stamps_ns, true = run.true_trajectory()
+    made = scene(run, stamps_ns, {"true": true}, None)
+    assert [way["name"] for way in made["trajectories"]] == ["truth"] and made["objects"] == []
     assert len(made["closures"][0]["keys"]) == 4
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from objreg_ros.report.page import page
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.report.run.sections import chapter
-from objreg_ros.truth import Truth
+from objreg_tools.report.page import page
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.report.run.sections import view_of_run
+from objreg_tools.truth import Truth
 from report.runs import TRUTH, summary, tracked
 
 FINDING = {"what": "No image was read.", "cause": "All <malformed>.", "todo": "objreg inspect x", "anchor": "no-images"}
 
 
 def view(told: dict[str, Any], truth: Truth = TRUTH) -> dict[str, Any]:
-    return chapter(RunSummary.of("walk", told, truth), None)
+    return view_of_run(RunSummary.of("walk", told, truth), None)
 
 
 def test_every_pair_has_a_row_with_its_numbers() -> None:
@@ -59,13 +59,13 @@ def test_one_loop_is_counted_in_the_singular() -> None:
 def test_without_odometry_the_truth_is_drawn() -> None:
     told = summary()
     told["glimpses"] = [{**row, "T_odom_camera": None} for row in told["glimpses"]]
-    way = view(told)["way"]
-    assert "is the ground truth" in way["words"] and [mark for mark, _ in way["legend"]] == [
+    way = view(told)["trajectory"]
+    assert "is the ground truth" in way["text"] and [mark for mark, _ in way["legend"]] == [
         "true",
         "accepted",
     ]
     assert 'data-pair="c0"' in way["drawing"]["wide"]
-    assert "neither odometry nor ground truth" in view(told, Truth([]))["way"]["words"]
+    assert "neither odometry nor ground truth" in view(told, Truth([]))["trajectory"]["text"]
 
 
 def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_stretch() -> None:
@@ -75,18 +75,18 @@ def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_str
         {**row, "T_odom_camera": None, "tracked": {"session": int(k >= lost), "T_session_camera": row["T_odom_camera"]}}
         for k, row in enumerate(rows)
     ]
-    way = view(told, Truth([]))["way"]
-    assert f"{len(rows) - lost} of {len(rows)} frames" in way["words"]
+    way = view(told, Truth([]))["trajectory"]
+    assert f"{len(rows) - lost} of {len(rows)} frames" in way["text"]
     assert way["legend"][0] == ("tracked", "our own tracking") and "line tracked" in way["drawing"]["wide"]
-    assert way["scene"]["ways"][0]["name"] == "our own tracking"
+    assert way["scene"]["trajectories"][0]["name"] == "our own tracking"
 
 
 def test_our_own_tracking_is_drawn_corrected_with_what_of_it_is_left_out() -> None:
     lost = tracked(begins=45)
     lost["constraints"] = []
     for told, words in ((tracked(), "120 of 120 frames"), (lost, "45 frames in 1 more sessions are not: nothing ties")):
-        way = view(told)["way"]
-        assert words in way["words"] and "There is no odometry" in way["words"]
+        way = view(told)["trajectory"]
+        assert words in way["text"] and "There is no odometry" in way["text"]
         assert ("tracked", "our own tracking") in way["legend"] and ("corrected", "corrected") in way["legend"]
         assert 'class="line tracked"' in way["drawing"]["wide"]
     assert "than our own tracking" in next(tile for tile in view(tracked())["tiles"] if "error" in tile["name"])["note"]

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import DepthImage, Intrinsics
-from objreg_ros.report.run.pairs import pairs_of
-from objreg_ros.report.run.run_summary import RunSummary
-from objreg_ros.report.run.thumbnails import thumbnails
+from objreg_ros.data.images import DepthImage, Intrinsics
+from objreg_tools.report.run.pairs import pairs_of
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.report.run.thumbnails import thumbnails
 from report.runs import STEP_NS, TRUTH, refusal, summary
 
 CAMERA = Intrinsics(fx=40.0, fy=40.0, cx=32.0, cy=24.0, width=64, height=48)

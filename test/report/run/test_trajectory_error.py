@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
+from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 
 RNG = np.random.default_rng(3)
 T_WORLD_ODOM = pose(rotation_from_vector(np.array([0.3, -2.0, 1.1])), np.array([4.0, -1.0, 2.0]))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.memory.store import Store
-from objreg_ros.report.store.moved_objects import Moves, moves_in
+from objreg_tools.report.store.moved_objects import Moves, moves_in
 from report.places import at, store_of, told
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from registration.samples import box
 
-from objreg_ros.report.store.portraits import TILE, portraits
-from objreg_ros.report.store.store_summary import survey
+from objreg_tools.report.store.portraits import TILE, portraits
+from objreg_tools.report.store.store_summary import survey
 from report.places import cup_and_book, store_of
 
 

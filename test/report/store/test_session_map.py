@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.report.store.session_map import session_maps
-from objreg_ros.report.store.store_summary import survey
+from objreg_tools.report.store.session_map import session_maps
+from objreg_tools.report.store.store_summary import survey
 from report.places import at, cup_and_book, store_of, told
 
 
@@ -24,7 +24,7 @@ def test_a_map_leaves_out_the_axis_of_least_spread(tmp_path: Path) -> None:
     one = session_maps(survey(cup_and_book(tmp_path / "s.db")))[0]
     assert one.axes == ("x", "z")
     assert one.places[1].xy == pytest.approx(np.array([0.5, 1.0]), abs=0.01)
-    assert one.points.shape == (len(one.way) + 2, 2)
+    assert one.points.shape == (len(one.trajectory) + 2, 2)
 
 
 def test_a_move_is_on_the_map_of_the_session_that_saw_it(tmp_path: Path) -> None:

@@ -10,9 +10,9 @@ import pytest
 from registration.samples import box
 
 from objreg_ros.memory.store import Store
-from objreg_ros.report.store.portraits import TILE, portraits
-from objreg_ros.report.store.store_drawing import CAPTION, MOVED, PANEL, draw
-from objreg_ros.report.store.store_summary import survey
+from objreg_tools.report.store.portraits import TILE, portraits
+from objreg_tools.report.store.store_drawing import CAPTION, MOVED, PANEL, draw
+from objreg_tools.report.store.store_summary import survey
 from report.places import at, cup_and_book, store_of, told
 
 
@@ -29,7 +29,7 @@ def test_every_session_has_a_panel_and_the_objects_are_below(tmp_path: Path) -> 
 
 
 def test_many_sessions_stay_within_what_a_viewer_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("objreg_ros.report.store.store_drawing.TALLEST", 1000)
+    monkeypatch.setattr("objreg_tools.report.store.store_drawing.TALLEST", 1000)
     file = store_of(tmp_path / "s.db", [(float(k), k, (box("cup", (0, 0, 1)),)) for k in range(10)])
     assert draw(survey(file), {}).shape[0] < 1000 + 100
 

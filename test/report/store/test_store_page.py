@@ -13,9 +13,9 @@ from registration.samples import box
 
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
-from objreg_ros.report.store.portraits import TILE
-from objreg_ros.report.store.store_page import store_page
-from objreg_ros.report.store.store_summary import survey
+from objreg_tools.report.store.portraits import TILE
+from objreg_tools.report.store.store_page import store_page
+from objreg_tools.report.store.store_summary import survey
 from report.places import at, cup_and_book, store_of, told
 
 

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from registration.samples import box, keyframe, moved
 
-from objreg_ros.data import Intrinsics, View
+from objreg_ros.data.frames import View
+from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.store_file import is_store
-from objreg_ros.report.store.store_summary import describe, survey
 from objreg_ros.sensor import KINECT, depth_sigma
+from objreg_tools.report.store.store_summary import describe, survey
 from report.places import cup_and_book
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from objreg_ros.data import FeltGravity, ImuSample
+from objreg_ros.data.frames import FeltGravity, ImuSample
 from objreg_ros.geometry import quaternion_from_rotation, rotation_from_vector
 from objreg_ros.segmenter.gravity.attitude import BIAS_DEG, WORD_NS, AttitudeFilter, G
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import FeltGravity
+from objreg_ros.data.frames import FeltGravity
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.segmenter.gravity.imu import Imu
 

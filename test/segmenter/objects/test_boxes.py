@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.data import Detections
+from objreg_ros.data.images import Detections
 from objreg_ros.segmenter.objects.boxes import halves, is_empty, pixel_boxes
 
 

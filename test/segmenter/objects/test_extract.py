@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import DepthImage, Intrinsics, PointFlag
+from objreg_ros.data.frames import PointFlag
+from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.geometry import back_project
 from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.objects.extract import EDGE, Pixels, cell_points, colours, extract

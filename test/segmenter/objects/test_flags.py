@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import DepthImage, PointFlag
+from objreg_ros.data.frames import PointFlag
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.objects.extract import Pixels
 from objreg_ros.segmenter.objects.flags import MIN_CELLS, _fit_plane, whole_flags

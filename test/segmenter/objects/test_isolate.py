@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import DepthImage, PointFlag
+from objreg_ros.data.frames import PointFlag
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.boxes import Box, pixel_boxes
 from objreg_ros.segmenter.objects.isolate import Cells, Isolated, Outline, cut_out, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams

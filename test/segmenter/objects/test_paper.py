@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from objreg_ros.data import DepthImage
+from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.paper import cut
 from objreg_ros.segmenter.params import SegmenterParams
 from segmenter.scenes import CAMERA

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import UNNAMED, Frame, ObjectCloud, PointFlag
+from objreg_ros.data.frames import UNNAMED, Frame, ObjectCloud, PointFlag
 from objreg_ros.segmenter.objects.unnamed import MOST
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, DepthImage, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.limits import MOST_DEPTH
 from objreg_ros.segmenter.sensor.depth_to_colour import FIRST_SIGMA, NOISE, DepthToColour, find_rotation, turned
@@ -81,7 +82,7 @@ def test_a_picture_without_depth_steps_tells_nothing_and_is_turned_as_those_befo
     bare = image(LAG)
     plain = DepthImage(depth=np.full_like(bare.depth, 2.0), rgb=bare.rgb, intrinsics=CAMERA, stamp_ns=0)
     offset = stream.offset(plain)
-    assert not offset.told and offset.rotation == pytest.approx(LAG, abs=0.002)
+    assert not offset.shown and offset.rotation == pytest.approx(LAG, abs=0.002)
 
 
 def test_depth_without_colour_is_left_as_it_is() -> None:

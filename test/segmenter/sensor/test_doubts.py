@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import DepthImage, Detections
+from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.sensor.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.sensor.view import reduced_view

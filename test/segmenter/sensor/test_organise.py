@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics, PointCloud
+from objreg_ros.data.images import Intrinsics, PointCloud
 from objreg_ros.geometry import back_project
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.organise import fit_intrinsics, organise

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, DepthImage, Intrinsics
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.segmenter.sensor.sensor_estimate import (
     FLOOR_MS,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros import limits
-from objreg_ros.data import DepthImage, Intrinsics
+from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.segmenter.sensor.view import LEAST_WIDTH, reduced_view, step_for
 
 

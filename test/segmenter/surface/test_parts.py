@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import DepthImage, Intrinsics
+from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.segmenter.objects.extract import colours
 from objreg_ros.segmenter.surface.cells import Window, reduce
 from objreg_ros.segmenter.surface.parts import RIM, Parts, measure

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""g2o's text: ``VERTEX_SE3:QUAT`` and ``EDGE_SE3:QUAT``, for g2o, GTSAM, Ceres' examples and SE-Sync.
+
+The information is of ``[translation, rotation vector]``, as GTSAM, RTAB-Map and Ceres read it. g2o itself takes the
+last three for half the rotation vector and so trusts rotations a quarter as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from objreg_mapper.constraint import Constraint, local_information
+from objreg_ros.data.checked import Array
+from objreg_ros.geometry import quaternion_from_rotation
+
+
+def graph_text(poses: Sequence[Array], edges: Iterable[tuple[int, int, Constraint]]) -> str:
+    """The file: vertices 0, 1, … at ``T_map_body (4, 4)`` and edges ``(from, to, constraint)``; vertex 0 is fixed.
+
+    A constraint is between the bodies at its two vertices, as `between_keyframes` makes it: not between cameras.
+    """
+    lines = [f"VERTEX_SE3:QUAT {i} {_pose_text(T)}" for i, T in enumerate(poses)]
+    lines += ["FIX 0"] if lines else []
+    lines += [edge_text(*edge) for edge in edges]
+    return "".join(line + "\n" for line in lines)
+
+
+def edge_text(from_id: int, to_id: int, constraint: Constraint) -> str:
+    """One edge: ids, ``T_from_to`` of the vertices, and the upper triangle of the information row by row."""
+    upper = local_information(constraint)[np.triu_indices(6)]
+    numbers = " ".join(f"{value:.9g}" for value in upper)
+    return f"EDGE_SE3:QUAT {from_id} {to_id} {_pose_text(constraint.T_from_to)} {numbers}"
+
+
+def _pose_text(T: Array) -> str:
+    return " ".join(f"{value:.9f}" for value in (*T[:3, 3], *quaternion_from_rotation(T[:3, :3])))

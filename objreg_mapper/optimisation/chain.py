@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Odometry from keyframe to keyframe as one chain: what it says between any two of them, and how they share an error.
+
+Each step errs alike in all axes, by a variance of position and one of rotation. So sums over the steps are enough to
+know the covariance between any two keyframes, however far apart, and a graph needs no node in between. What the map
+moves a later keyframe by is shared among those before as least squares would: by their covariance with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from objreg_mapper.constraint import Constraint, rotation_vectors
+from objreg_mapper.optimisation.steady import Steady, corrected_steps
+from objreg_ros.data.checked import Array
+from objreg_ros.geometry import inverses, rotation_from_vector, skew
+
+STRAIGHT_RAD = 0.06  # one sigma: what an error that is shared by first order may turn by
+
+
+class Chain:
+    """``T_chain_body (n, 4, 4)`` of keyframes, with what is steadily wrong taken out, and the sums of their errors.
+
+    The variances of a step are those of its position and its rotation, m^2 and rad^2 in every axis.
+    """
+
+    def __init__(self, T_odom_first: Array, steady: Steady) -> None:
+        self.steady, self.T_chain_body = steady, T_odom_first[None].copy()
+        self._sums: tuple[Array, ...] = np.zeros((1,)), np.zeros((1,)), np.zeros((1, 3)), np.zeros((1, 3, 3))
+
+    def __len__(self) -> int:
+        return len(self.T_chain_body)
+
+    def extend(self, T_odom_body: Array, variances: Array) -> None:
+        """Add keyframes: poses (m + 1, 4, 4) of odometry, the newest that is here first, and variances (m, 2)."""
+        poses = [self.T_chain_body[-1]]
+        for step in corrected_steps(T_odom_body, self.steady):
+            poses.append(poses[-1] @ step)
+        new = np.array(poses[1:]).reshape(-1, 4, 4)
+        self.T_chain_body = np.concatenate([self.T_chain_body, new])
+        a, b = variances.T
+        p = new[:, :3, 3] - self.T_chain_body[0, :3, 3]
+        parts = a, b, b[:, None] * p, b[:, None, None] * p[:, :, None] * p[:, None, :]
+        grown = zip(self._sums, parts, strict=True)
+        self._sums = tuple(np.concatenate([old, old[-1] + np.cumsum(part, axis=0)]) for old, part in grown)
+
+    def between(self, k1: int, k2: int) -> Constraint:
+        """What odometry says between two keyframes, the earlier one first."""
+        T_1_2 = inverses(self.T_chain_body[k1 : k1 + 1])[0] @ self.T_chain_body[k2]
+        J = np.kron(np.eye(2), self.T_chain_body[k1, :3, :3].T)
+        return Constraint(T_1_2, J @ self._covariances(np.array([k1]), np.array([k2]))[0] @ J.T)
+
+    def motions(self, k1: Array, k2: Array) -> tuple[Array, Array]:
+        """What odometry says from keyframes to others that are no earlier: poses (m, 4, 4) and the (m, 6, 6) of [t r].
+
+        These are of the errors in the axes of the later ones.
+        """
+        J = np.kron(np.eye(2), self.T_chain_body[k2, :3, :3].transpose(0, 2, 1))
+        C = J @ self._covariances(k1, k2) @ J.transpose(0, 2, 1)
+        return inverses(self.T_chain_body[k1]) @ self.T_chain_body[k2], C
+
+    def straight_until(self, k1: int) -> int:
+        """The last keyframe until which odometry has not turned far enough to matter; the next one at least."""
+        return max(int(np.searchsorted(self._sums[1], self._sums[1][k1] + STRAIGHT_RAD**2, side="right")) - 1, k1 + 1)
+
+    def spread(self, nodes: Sequence[int], T_map_body: Array, keyframes: Array | None = None) -> Array:
+        """(m, 4, 4): keyframes in the map, all of them if None, from where it has those of ``nodes``, which increase.
+
+        The conditional mean of each, given the next node; what is before the first and after the last is carried along.
+        """
+        wanted = np.arange(len(self)) if keyframes is None else keyframes
+        at = np.clip(np.searchsorted(nodes, wanted, side="right") - 1, 0, len(nodes) - 1)
+        k1 = np.asarray(nodes)[at]
+        T_map_chain = T_map_body[at] @ inverses(self.T_chain_body[k1])
+        local = self.T_chain_body[wanted].copy()
+        inside = np.flatnonzero((wanted > k1) & (at < len(nodes) - 1))
+        if len(inside):
+            at, k2 = at[inside], np.asarray(nodes)[at[inside] + 1]
+            target = inverses(T_map_chain[inside]) @ T_map_body[at + 1]
+            local[inside] = self._shared(k1[inside], wanted[inside], k2, target)
+        return T_map_chain @ local
+
+    def _shared(self, k1: Array, k: Array, k2: Array, target: Array) -> Array:
+        """(m, 4, 4): keyframes ``k`` in the chain's frame, once ``k2`` is at a target there and ``k1`` stays."""
+        here, end = self.T_chain_body[k], self.T_chain_body[k2]
+        turn = rotation_vectors(target[:, :3, :3] @ end[:, :3, :3].transpose(0, 2, 1))
+        error = np.hstack([target[:, :3, 3] - end[:, :3, 3], turn])
+        share = np.linalg.solve(self._covariances(k1, k2), error[:, :, None])[:, :, 0]
+        lever = end[:, :3, 3] - here[:, :3, 3]  # what has come up at a keyframe turns the end about it
+        share[:, 3:] += np.cross(lever, share[:, :3])
+        moved = np.einsum("mij,mj->mi", self._covariances(k1, k), share)
+        T = here.copy()
+        T[:, :3, 3] += moved[:, :3]
+        T[:, :3, :3] = rotation_from_vector(moved[:, 3:]) @ here[:, :3, :3]
+        return T
+
+    def _covariances(self, k1: Array, k2: Array) -> Array:
+        """(m, 6, 6) of the errors [t r] that come up from keyframes to later ones, there and in the axes of the chain.
+
+        A step turns what follows about where it ends: ``t = sum(t_s + r_s x (p - p_s))``.
+        """
+        a, b, bp, bpp = (total[k2] - total[k1] for total in self._sums)
+        p = self.T_chain_body[k2, :3, 3] - self.T_chain_body[0, :3, 3]
+        mixed = bp[:, :, None] * p[:, None, :]
+        M = b[:, None, None] * p[:, :, None] * p[:, None, :] - mixed - mixed.transpose(0, 2, 1) + bpp
+        levers = skew(b[:, None] * p - bp)
+        C = np.zeros((len(p), 6, 6))
+        C[:, :3, :3] = (a + np.trace(M, axis1=1, axis2=2))[:, None, None] * np.eye(3) - M
+        C[:, 3:, 3:] = b[:, None, None] * np.eye(3)
+        C[:, :3, 3:], C[:, 3:, :3] = -levers, levers
+        return C

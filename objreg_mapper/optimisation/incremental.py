@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A pose graph that is solved as it grows, by GTSAM's iSAM2.
+
+Kaess et al., "iSAM2: Incremental Smoothing and Mapping Using the Bayes Tree" (2012).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from objreg_mapper.optimisation.edges import Edges
+from objreg_ros.data.checked import Array
+
+RELINEARISED = 0.05  # rad and m: a node that moves farther is linearised anew
+HELD_SIGMA = 1e-2  # rad and m; how fast the first node is held moves nothing, as nothing else holds it
+MOST_UPDATES = 4
+FEW = 0.05  # of all nodes
+INSTALL = "expected gtsam, which solves the map, got none: pip install --no-deps gtsam (or objreg_ros[mapper])"
+
+
+class MissingError(ImportError, ValueError):
+    """What solves the map is not installed; a node that needs it ends with this line."""
+
+
+def load() -> Any:
+    """GTSAM, imported now: it takes some time, in which nothing else runs. `MissingError` where it is not installed."""
+    try:
+        return import_module("gtsam")
+    except ImportError as error:
+        raise MissingError(INSTALL) from error
+
+
+class IncrementalGraph:
+    """Nodes by number from 0, of which the first is held at a pose; edges by the numbers that come back for them.
+
+    What is asked for waits for the next look at the graph, and is done at once. It is solved by Cholesky's factors, and
+    by QR, which takes twice the time, from where these are too coarse: a lie that claims a micrometre among odometry of
+    metres. RuntimeError where GTSAM finds no solution; the graph is of no use then.
+    """
+
+    def __init__(self, T_map_first: Array) -> None:
+        self._gtsam = load()
+        self._is_careful = False
+        self._edges: list[Any] = []  # GTSAM's factors, by our numbers; None of one that is gone
+        self._places: list[int] = []  # GTSAM's numbers of them
+        self._settled = T_map_first[None]
+        self._begin()
+
+    @property
+    def count(self) -> int:
+        """How many nodes there are."""
+        return len(self._settled)
+
+    def _begin(self) -> None:
+        """All that is there, in a new iSAM2."""
+        gtsam = self._gtsam
+        self._isam = gtsam.ISAM2(self._params())
+        self._clear()
+        noise = gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
+        self._new_factors.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(self._settled[0]), noise))
+        here = [number for number, edge in enumerate(self._edges) if edge is not None]
+        for number in here:
+            self._new_factors.add(self._edges[number])
+        for k, T in enumerate(self._settled):
+            self._new_values.insert(k, gtsam.Pose3(T))
+        places = list(self._isam.update(self._new_factors, self._new_values).getNewFactorsIndices())
+        self._places = [-1] * len(self._edges)
+        for number, place in zip(here, places[1:], strict=True):
+            self._places[number] = place
+        self._clear()
+
+    def _clear(self) -> None:
+        """Nothing waits for the next update."""
+        self._new_factors, self._new_values = self._gtsam.NonlinearFactorGraph(), self._gtsam.Values()
+        self._gone: list[int] = []
+
+    def _params(self) -> Any:
+        params = self._gtsam.ISAM2Params()
+        params.setRelinearizeThreshold(RELINEARISED)
+        params.relinearizeSkip = 1
+        params.setFactorization("QR" if self._is_careful else "CHOLESKY")
+        return params
+
+    def copied(self) -> IncrementalGraph:
+        """The same once more, to try something on."""
+        self._update()
+        other = copy(self)
+        other._isam = self._gtsam.ISAM2(self._isam)
+        other._edges, other._places = list(self._edges), list(self._places)
+        other._clear()
+        return other
+
+    def grow(self, poses: Array, edges: Edges, gone: Sequence[int] = ()) -> list[int]:
+        """Add nodes at ``poses (n, 4, 4)``, by the next numbers, and the edges that tie them; take out those gone."""
+        for k, T in enumerate(poses, self.count):
+            self._new_values.insert(k, self._gtsam.Pose3(T))
+        self._settled = np.concatenate([self._settled, poses])
+        numbers = self.add(edges)
+        self.remove(gone)
+        return numbers
+
+    def add(self, edges: Edges) -> list[int]:
+        """Tie nodes that are there."""
+        first = len(self._edges)
+        for factor in self._factors(edges):
+            self._edges.append(factor)
+            self._new_factors.add(factor)
+        return list(range(first, len(self._edges)))
+
+    def _factors(self, edges: Edges) -> Iterator[Any]:
+        gtsam = self._gtsam
+        for k1, k2, T, W in zip(edges.k1.tolist(), edges.k2.tolist(), edges.T_1_2, edges.whitening, strict=True):
+            noise = gtsam.noiseModel.Gaussian.SqrtInformation(W, False)
+            yield gtsam.BetweenFactorPose3(k1, k2, gtsam.Pose3(T), noise)
+
+    def remove(self, numbers: Sequence[int]) -> None:
+        """Take edges out."""
+        if any(number >= len(self._places) for number in numbers):
+            self._update()
+        for number in numbers:
+            self._gone.append(self._places[number])
+            self._edges[number] = None
+
+    def settle(self) -> Array:
+        """(n, 4, 4): where the nodes are with all that waits. What moves far is linearised anew, until little does."""
+        relinearised = self.count
+        for _ in range(MOST_UPDATES):
+            known, self._settled = self._settled, self.poses()
+            if relinearised <= FEW * self.count or np.abs(self._settled - known).max() < RELINEARISED:
+                return self._settled
+            relinearised = self._carefully(lambda: self._isam.update().getVariablesRelinearized())
+        self._settled = self.poses()
+        return self._settled
+
+    def _carefully(self, work: Callable[[], Any]) -> Any:
+        """What comes of work; where that fails, of doing it once more in a graph that is solved with more care."""
+        try:
+            return work()
+        except RuntimeError:
+            if self._is_careful:
+                raise
+        self._is_careful = True
+        self._begin()
+        return work()
+
+    def _update(self) -> None:
+        self._carefully(self._take_in)
+
+    def _take_in(self) -> None:
+        if self._new_factors.size() or self._gone:
+            result = self._isam.update(self._new_factors, self._new_values, self._gone)
+            self._places += list(result.getNewFactorsIndices())
+            self._clear()
+
+    def poses(self) -> Array:
+        """(n, 4, 4) of all nodes."""
+        self._update()
+        rows = self._gtsam.utilities.extractPose3(self._isam.calculateEstimate())
+        T = np.tile(np.eye(4), (len(rows), 1, 1))
+        T[:, :3, :3], T[:, :3, 3] = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:]
+        return T
+
+    def error_covariance(self, edges: Edges) -> Array:
+        """(6 m, 6 m): how the whitened errors [r t] of edges, in the graph or not, vary as it knows its nodes.
+
+        All of it where the graph was linearised: elsewhere what is known well and what is not would mix.
+        """
+        self._update()
+        ends = np.unique([edges.k1, edges.k2])
+        joint = self._carefully(lambda: self._isam.jointMarginalCovariance(ends.tolist()))
+        blocks = np.block([[joint.at(a, b) for b in ends] for a in ends])
+        point, columns = self._isam.getLinearizationPoint(), np.arange(6)
+        J = np.zeros((6 * len(edges), 6 * len(ends)))
+        for row, factor in enumerate(self._factors(edges)):
+            sides = np.searchsorted(ends, factor.keys())
+            J[6 * row : 6 * row + 6, (6 * sides[:, None] + columns).ravel()] = factor.linearize(point).jacobian()[0]
+        return J @ blocks @ J.T

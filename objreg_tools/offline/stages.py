@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Detector, segmenter and registrar as a recording needs them: what each must be able to do, and how they are made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure, Rejected
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import ColourImage, DepthImage, Detections, PointCloud
+from objreg_ros.detector.params import DetectorParams
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
+from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
+
+
+class Detects(Protocol):
+    """The interface of the detector."""
+
+    def detect(self, image: ColourImage) -> Detections: ...
+
+
+class Segments(Protocol):
+    """The interface of the segmenter."""
+
+    @property
+    def choice(self) -> GravityChoice:
+        """The source of gravity in the last frame."""
+        ...
+
+    @property
+    def sensor(self) -> SensorEstimate:
+        """What the frames showed of their sensor."""
+        ...
+
+    def segment(
+        self,
+        detections: Detections,
+        depth: DepthImage,
+        gravity: Array | None = None,
+        *,
+        gravity_sigma_deg: float | None = None,
+    ) -> Frame: ...
+
+
+class Outcome(Protocol):
+    """The registrar's result for a frame."""
+
+    @property
+    def closures(self) -> tuple[LoopClosure, ...]: ...
+
+    @property
+    def rejected(self) -> tuple[Rejected, ...]: ...
+
+
+class Registers(Protocol):
+    """The interface of the registrar."""
+
+    @property
+    def tracked(self) -> tuple[int, Array] | None:
+        """The session of the newest frame and where the camera is in it, if that was followed."""
+        ...
+
+    def process(self, frame: Frame) -> Outcome: ...
+
+    def finish(self, doubt: str = "") -> Outcome: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Stages:
+    """Detector, segmenter and registrar, and how a cloud becomes a depth image."""
+
+    detector: Detects
+    segmenter: Segments
+    registrar: Registers
+    organise: Callable[[PointCloud, Any], DepthImage]
+
+
+def build_stages(
+    detector: DetectorParams, segmenter: SegmenterParams, registrar: RegistrarParams, detects: Detects | None = None
+) -> tuple[Stages, Callable[[], None]]:
+    """The stages by their parameters, and what closes them. OSError and ValueError as the stages raise them.
+
+    ``detects`` takes the place of the detector: what remembers pictures that it has seen before, say.
+    """
+    from objreg_ros import share
+    from objreg_ros.detector.detector import Detector
+    from objreg_ros.registrar.registrar import Registrar
+    from objreg_ros.registrar.warm import warm
+    from objreg_ros.segmenter.segment import Segmenter
+    from objreg_ros.segmenter.sensor.organise import organise
+
+    detects = detects or Detector.of(detector, share.model)
+    segments = Segmenter(segmenter)
+    segments.warm()
+    warm(registrar)
+    registers = Registrar(registrar)
+    return Stages(detects, segments, registers, organise), registers.close

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The clouds of all pairs of a run, as many as a page can carry."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from math import ceil, sqrt
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data.checked import Array
+from objreg_ros.data.images import DepthImage
+from objreg_ros.geometry import back_project
+from objreg_tools.report.packed import encoded, packed
+from objreg_tools.report.run.pairs import Pair, by_interest
+from objreg_tools.report.run.pictures import Album
+
+PAGE_BYTES = 4_000_000  # of all clouds of a page; that of one run has 15 MB for everything
+MOST_POINTS = 64 * 48  # of one cloud
+LEFT_OUT = "left out, as the page would grow too large"
+
+
+@dataclass
+class Clouds:
+    """``moments`` by stamp, in their camera's frame, and ``poses`` by the key of a pair: T_from_to (3, 4), row by row.
+
+    ``absent`` says of each pair with a pose but without clouds, by its key, why there are none.
+    """
+
+    moments: dict[str, dict[str, Any]] = field(default_factory=dict)
+    poses: dict[str, list[float]] = field(default_factory=dict)
+    absent: dict[str, str] = field(default_factory=dict)
+    size: int = 0
+
+    def add(self, pair: Pair, album: Album, most_bytes: int) -> None:
+        """Both clouds of a pair and its pose, or why they are absent."""
+        stamps_ns = (pair.outcome.from_ns, pair.outcome.to_ns)
+        seen = {stamp_ns: image for stamp_ns in stamps_ns if (image := album.at(stamp_ns)) is not None}
+        whys = [why for stamp_ns in stamps_ns if (why := _lacking(seen.get(stamp_ns), album.lacking(stamp_ns)))]
+        if whys or pair.outcome.T_from_to is None:
+            self.absent[pair.key] = whys[0] if whys else "there is no pose"
+            return
+        moments = {str(stamp): _cloud(image) for stamp, image in seen.items() if str(stamp) not in self.moments}
+        size = len(json.dumps(moments)) if moments else 0
+        if self.size + size > most_bytes:
+            self.absent[pair.key] = LEFT_OUT
+            return
+        self.size += size
+        self.moments |= moments
+        self.poses[pair.key] = pair.outcome.T_from_to[:3].ravel().round(6).tolist()
+
+    @property
+    def lacking(self) -> str:
+        """How many pairs have a pose but no clouds, and why; empty where all have."""
+        whys = Counter(self.absent.values())
+        return " ".join(
+            f"No clouds of {n} of {len(self.poses) + whys.total()}: {why}." for why, n in whys.most_common()
+        )
+
+
+def clouds(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAGE_BYTES) -> Clouds:
+    """The clouds of the pairs that have a pose: of false constraints first, then of right ones, then of refusals."""
+    made = Clouds()
+    if album is None:
+        return made
+    for pair in by_interest(pairs):
+        if pair.outcome.T_from_to is None or pair.outcome.from_ns == pair.outcome.to_ns:
+            continue
+        if LEFT_OUT in made.absent.values():
+            made.absent[pair.key] = LEFT_OUT
+        else:
+            made.add(pair, album, most_bytes)
+    return made
+
+
+def thinned(seen: DepthImage) -> tuple[Array, Array]:
+    """Points (N, 3) in the camera, m, and their colours (N, 3): `MOST_POINTS` at most, on a grid of pixels."""
+    step = ceil(sqrt(max(1.0, seen.depth.size / MOST_POINTS)))
+    while -(-seen.depth.shape[0] // step) * -(-seen.depth.shape[1] // step) > MOST_POINTS:
+        step += 1
+    rows = slice(step // 2, None, step)
+    depth, camera = seen.depth[rows, rows], seen.intrinsics.scaled(step)
+    measured = depth > 0
+    xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)[measured]
+    colours = np.full((len(xyz), 3), 160, np.uint8) if seen.rgb is None else seen.rgb[rows, rows][measured]
+    return xyz, colours
+
+
+def _lacking(seen: DepthImage | None, why: str) -> str:
+    """Why a keyframe has no cloud; empty where it has one."""
+    if seen is None:
+        return why
+    return "" if (seen.depth > 0).any() else "no depth was measured"
+
+
+def _cloud(seen: DepthImage) -> dict[str, Any]:
+    xyz, colours = thinned(seen)
+    return {**packed(xyz), "rgb": encoded(colours)}

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rows in the JSON of a run: its frames, closures and refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from objreg_ros.data.checked import Array
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.frames import Odometry
+from objreg_tools.report.run.camera_map import TrackedFrame
+
+Row = TypeVar("Row")
+
+MOST_NS = 1 << 63
+
+
+@dataclass(frozen=True, slots=True)
+class Glimpse:
+    """One frame: when, from where (None without odometry), the labels detected, and objects by label and position.
+
+    Positions (3,) are the middles of the objects in the camera, m.
+    """
+
+    stamp_ns: int
+    T_odom_camera: Array | None = None
+    labels: tuple[str, ...] = ()
+    tracked: tuple[int, Array] | None = None  # without odometry: session and T_session_camera by our own tracking
+    objects: tuple[tuple[str, Array], ...] = ()
+
+    def pose(self, by_tracking: bool) -> tuple[int, Array] | None:
+        """The session and ``T_session_camera`` of our own tracking, or of odometry; None where there is none."""
+        if by_tracking:
+            return self.tracked
+        return None if self.T_odom_camera is None else (0, self.T_odom_camera)
+
+
+def advancing(glimpses: Sequence[Glimpse], by_tracking: bool = False) -> list[tuple[Glimpse, TrackedFrame]]:
+    """The frames with a pose that are later than all before them: stamps repeat and go back where a bag is looped.
+
+    ``by_tracking``: the pose is that of our own tracking, else that of odometry, whose one session is 0.
+    """
+    later: list[tuple[Glimpse, TrackedFrame]] = []
+    for glimpse in glimpses:
+        known = glimpse.pose(by_tracking)
+        if known is not None and (not later or glimpse.stamp_ns > later[-1][0].stamp_ns):
+            later.append((glimpse, TrackedFrame(glimpse.stamp_ns, *known)))
+    return later
+
+
+def read_rows(name: str, summary: Mapping[str, Any], key: str, read: Callable[[Any], Row]) -> tuple[Row, ...]:
+    """The rows of a key; none where it is missing. ValueError that names the run where one is not as it should be."""
+    try:
+        return tuple(read(row) for row in summary.get(key, ()))
+    except (TypeError, KeyError, AttributeError, ValueError, OverflowError) as error:
+        got = " ".join(str(summary[key]).split())[:80]
+        raise ValueError(
+            f"{name}: expected {key} as `objreg offline --json` writes them, got {got} ({error!r}); run it again"
+        ) from error
+
+
+def glimpse_of(row: Mapping[str, Any]) -> Glimpse:
+    """A frame; ValueError where it is none."""
+    pose, stamp_ns, tracked = row.get("T_odom_camera"), _stamp(row["stamp_ns"]), row.get("tracked")
+    return Glimpse(
+        stamp_ns=stamp_ns,
+        T_odom_camera=None if pose is None else _rigid(pose, stamp_ns),
+        labels=tuple(map(_spaced, row.get("labels", ()))),
+        tracked=None if tracked is None else (int(tracked["session"]), _rigid(tracked["T_session_camera"], stamp_ns)),
+        objects=tuple((_spaced(label), _place(xyz)) for label, xyz in row.get("objects", ())),
+    )
+
+
+def _stamp(value: Any) -> int:
+    """A stamp in ns; ValueError for what a message cannot have."""
+    stamp_ns = int(value)
+    if abs(stamp_ns) >= MOST_NS:
+        raise ValueError(f"expected a stamp in ns, got {value}")
+    return stamp_ns
+
+
+def _place(xyz: Any) -> Array:
+    """A position (3,) m; ValueError if it is none."""
+    place = np.array(xyz, float)
+    if place.shape != (3,) or not np.isfinite(place).all():
+        raise ValueError(f"expected three finite numbers, got {xyz}")
+    return place
+
+
+def _tried_pose(pose: Any) -> Array | None:
+    """A refused pose (4, 4), which may not be rigid; None where there is none."""
+    if pose is None:
+        return None
+    T = np.array(pose, float)
+    if T.shape != (4, 4):
+        raise ValueError(f"expected a pose of 4 x 4 numbers, got {T.shape}")
+    return T if np.isfinite(T).all() else None
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, got {value!r}")
+    return value
+
+
+def _rigid(pose: Any, stamp_ns: int) -> Array:
+    """The pose (4, 4); ValueError if it is none."""
+    return Odometry(T_odom_body=np.array(pose, float), stamp_ns=stamp_ns).T_odom_body
+
+
+def closure_of(row: Mapping[str, Any]) -> LoopClosure:
+    """A closure, without the sessions of its keyframes; ValueError where it is none."""
+    return LoopClosure(
+        from_ns=_stamp(row["from_ns"]),
+        to_ns=_stamp(row["to_ns"]),
+        T_from_to=np.array(row["T_from_to"], float),
+        covariance=np.array(row["covariance"], float),
+        labels=tuple(map(_spaced, row["labels"])),
+        evidence=_evidence(row),
+    )
+
+
+def _evidence(row: Mapping[str, Any]) -> dict[str, float]:
+    return {_spaced(name): float(number) for name, number in row.get("evidence", {}).items()}
+
+
+def _spaced(label: str) -> str:
+    """A label as it reads on a page."""
+    return label.replace("_", " ")
+
+
+def refusal_of(row: Mapping[str, Any]) -> Rejected:
+    """A refused pair; ValueError where it is none."""
+    return Rejected(
+        reason=Reason(row["reason"]),
+        from_ns=_stamp(row["from_ns"]),
+        to_ns=_stamp(row["to_ns"]),
+        detail=_text(row["detail"]),
+        T_from_to=_tried_pose(row.get("T_from_to")),
+        evidence=_evidence(row),
+    )

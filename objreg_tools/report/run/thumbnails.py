@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pictures of all pairs of a run, as many as a page can carry."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from objreg_ros.data.images import DepthImage
+from objreg_tools.report.run.pairs import Pair, by_interest
+from objreg_tools.report.run.pictures import Album, data_uri, overlay
+
+PAGE_BYTES = 7_000_000  # of all thumbnails of a page; that of one run has 15 MB for everything
+QUALITY = 70  # of a JPEG: half the bytes of what the galleries show
+
+
+@dataclass
+class Thumbnails:
+    """Data URIs: ``moments`` by stamp and ``overlays`` by the key of a pair.
+
+    ``lacking`` counts the pairs without pictures by why; ``left_out`` is how many had no place.
+    """
+
+    moments: dict[int, str] = field(default_factory=dict)
+    overlays: dict[str, str] = field(default_factory=dict)
+    lacking: Counter[str] = field(default_factory=Counter)
+    left_out: int = 0
+    size: int = 0
+
+    def add(self, pair: Pair, album: Album, most_bytes: int) -> None:
+        """Both pictures of a pair, and the second over the first by its pose; nothing where they have no place."""
+        first, second = album.at(pair.outcome.from_ns), album.at(pair.outcome.to_ns)
+        if first is None or second is None:
+            self.lacking[album.lacking(pair.outcome.from_ns) or album.lacking(pair.outcome.to_ns)] += 1
+            return
+        moments = self._new_moments({pair.outcome.from_ns: first, pair.outcome.to_ns: second})
+        T_from_to = pair.outcome.T_from_to
+        over = "" if T_from_to is None else data_uri(overlay(first, second, T_from_to), QUALITY)
+        size = sum(map(len, moments.values())) + len(over)
+        if self.size + size > most_bytes:
+            self.left_out += 1
+            return
+        self.size += size
+        self.moments |= moments
+        if over:
+            self.overlays[pair.key] = over
+
+    def _new_moments(self, seen: Mapping[int, DepthImage]) -> dict[int, str]:
+        """The pictures that are not there yet."""
+        return {
+            stamp_ns: data_uri(image.rgb, QUALITY)
+            for stamp_ns, image in seen.items()
+            if stamp_ns not in self.moments and image.rgb is not None
+        }
+
+
+def thumbnails(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAGE_BYTES) -> Thumbnails:
+    """The pictures of pairs, the most interesting first; of what was tried, or has two stamps at least."""
+    drawn = Thumbnails()
+    if album is None:
+        return drawn
+    for pair in by_interest(pairs):
+        if pair.outcome.from_ns == pair.outcome.to_ns:
+            continue
+        if drawn.left_out:
+            drawn.left_out += 1
+        else:
+            drawn.add(pair, album, most_bytes)
+    return drawn

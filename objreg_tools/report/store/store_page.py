@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A store as a page: sessions from above, its objects with pictures, and what moved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data.checked import Array
+from objreg_ros.memory.landmarks import Landmark
+from objreg_tools.report.drawing import Plot
+from objreg_tools.report.page import environment
+from objreg_tools.report.run.pictures import picture_uri
+from objreg_tools.report.store.session_map import SessionMap, session_maps
+from objreg_tools.report.store.store_summary import StoreSummary, moves_as_text
+
+SERIES = 7  # colours of the page before grey
+WIDTHS = {"wide": 540, "narrow": 380}  # px
+SIDES = {"wide": (300, 480), "narrow": (240, 380)}  # px, the least and the greatest height
+
+
+def store_page(found: StoreSummary, pictures: Mapping[int, Array]) -> str:
+    """The HTML of a store; ``pictures`` are the portraits by landmark, and a landmark may lack one."""
+    styles = {label: f"series-{min(k, SERIES)}" for k, label in enumerate(found.labels)}
+    maps = session_maps(found)
+    return environment().get_template("store.html.j2").render(
+        found=found,
+        moves=moves_as_text(found),
+        legend=[(styles[label], f"{label} ({count})") for label, count in found.labels.items()],
+        sessions=[
+            {**session, "drawing": {name: _drawn(one, styles, name) for name in WIDTHS}}
+            for session, one in zip(found.sessions, maps, strict=True)
+        ],
+        objects=[_object(found, mark, pictures) for mark in found.landmarks],
+    )  # fmt: skip
+
+
+def _drawn(one: SessionMap, styles: Mapping[str, str], width: str) -> str:
+    least, most = SIDES[width]
+    plot = Plot.equal(one.points, WIDTHS[width], least, most)
+    plot.x_axis(f"{one.axes[0]} [m]")
+    plot.y_axis(f"{one.axes[1]} [m]")
+    plot.line(one.trajectory, "faint", "camera trajectory")
+    for title, stood, stands in one.moves:
+        plot.line(np.array([stood, stands]), "false", f"moved: {title}")
+        plot.dot(stood[0], stood[1], "refused", f"stood here: {title}", 4.0)
+    for place in one.places:
+        text = f"{place.label} {place.landmark}, in {place.sightings} keyframes"
+        plot.dot(place.xy[0], place.xy[1], styles[place.label], text, 4.0 + min(place.sightings, 8) / 2)
+        plot.text(plot.x(place.xy[0]) + 9, plot.y(place.xy[1]) + 4, str(place.landmark))
+    return plot.svg(f"session {one.session} from above")
+
+
+def _object(found: StoreSummary, mark: Landmark, pictures: Mapping[int, Array]) -> dict[str, Any]:
+    rows = found.by_landmark[mark.landmark]
+    return {
+        "landmark": mark.landmark,
+        "label": mark.label,
+        "picture": picture_uri(pictures[mark.landmark]) if mark.landmark in pictures else "",
+        "sightings": mark.sightings,
+        "sessions": _listed(sorted({row.session for row in rows})),
+        "first": found.moment(rows[0]),
+        "last": found.moment(rows[-1]),
+        "place": ", ".join(f"{value:.2f}" for value in mark.position),
+    }
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers))

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a scene to an ideal picture: rasteriser, lamps, shadows, lens."""

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many recordings at once: the same on any number of workers, never twice, and none stops another."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet
+import pytest
+from click.testing import CliRunner, Result
+from detector.tiny_model import save_constant_model, tf_outputs
+from distributed import LocalCluster
+from recording.sample_folders import tum_folder
+
+from objreg_tools.cli.commands.batch import command
+from objreg_tools.workers import Done
+
+TIMES = ("about", "stage_ms", "batch")
+
+
+@pytest.fixture
+def words(tmp_path: Path) -> list[object]:
+    """Two recordings, and the model that sees one cup in the middle of every picture."""
+    (tmp_path / "labelmap.txt").write_text("cup\ntv\n")
+    model = save_constant_model(tmp_path / "tiny.onnx", tf_outputs([[0.3, 0.3, 0.7, 0.7]], [0], [0.9]))
+    return [tum_folder(tmp_path / "a", frames=3), tum_folder(tmp_path / "b", frames=2), "--model", model]
+
+
+@pytest.fixture
+def alone(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """The work is done in this process; what of it was asked for."""
+    asked: list[Path] = []
+
+    def here(work: Any, items: list[Path], workers: int | None, scheduler: str) -> Any:
+        for item in items:
+            asked.append(item)
+            try:
+                yield Done(item, work(item))
+            except OSError as error:
+                yield Done(item, error=error)
+
+    monkeypatch.setattr("objreg_tools.cli.commands.batch.spread", here)
+    return asked
+
+
+def batch(*words: object) -> Result:
+    return CliRunner().invoke(command, [str(word) for word in words], catch_exceptions=False, standalone_mode=False)
+
+
+def told(folder: Path) -> dict[str, Any]:
+    summaries = {file.name: json.loads(file.read_text()) for file in folder.glob("*.json")}
+    return {name: {k: v for k, v in one.items() if k not in TIMES} for name, one in summaries.items()}
+
+
+def test_one_worker_and_two_give_the_same(words: list[object], tmp_path: Path) -> None:
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
+        one = batch(*words, "--out", tmp_path / "one", "--scheduler", cluster.scheduler_address)
+    two = batch(*words, "--out", tmp_path / "two", "--workers", 2)
+    assert one.return_value == two.return_value == 0 and "2 recordings, 0 failed, 5 frames" in two.output
+    assert len(told(tmp_path / "one")) == 2 and told(tmp_path / "one") == told(tmp_path / "two")
+    for name in ("constraints.parquet", "refusals.parquet"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+def test_what_is_done_is_not_done_again_unless_something_changed(
+    words: list[object], tmp_path: Path, alone: list[Path]
+) -> None:
+    first, out = words[0], ("--out", tmp_path / "out")
+    batch(*words[1:], *out)
+    again = batch(*words, *out)
+    assert [path.name for path in alone] == ["b", "a"] and "1 of 2 recordings are done already" in again.output
+    changed = batch(first, *words[2:], *out, "--set", "registrar.seed=7", "--max-frames", 1)
+    assert "! 1 were made otherwise and are done anew: max_frames, registrar.seed changed" in changed.output
+    assert len(alone) == 3 and "1 recordings, 0 failed, 1 frames" in changed.output
+
+
+def test_half_a_result_is_none(words: list[object], tmp_path: Path, alone: list[Path]) -> None:
+    batch(*words[1:], "--out", tmp_path / "out")
+    (file,) = (tmp_path / "out").glob("*.json")
+    file.write_text(file.read_text()[:100])
+    assert batch(*words[1:], "--out", tmp_path / "out").return_value == 0 and len(alone) == 2
+
+
+EDITS: tuple[tuple[str, Any], ...] = (
+    ("frames", None), ("frames", -1), ("frames", 1e300), ("frames", 10**400), ("objects", True),
+    ("truth", []), ("truth", {}), ("truth", {"count": 1, "strict": "a", "loose": 0, "false": None}),
+    ("constraints", None), ("constraints", [{}]), ("constraints", 5), ("refusals", ["a"]),
+    ("refusals", [{"from_ns": 2**70, "to_ns": 1, "T_from_to": None, "reason": "a", "detail": "b", "evidence": {}}]),
+    ("refusals", [{"from_ns": 2, "to_ns": 1, "T_from_to": [[1]], "reason": "a", "detail": "b", "evidence": {}}]),
+    ("refusals", [{"from_ns": 2, "to_ns": 1, "T_from_to": None, "reason": "\ud800", "detail": "", "evidence": {}}]),
+    ("rejected", {"a": "b"}), ("rejected", 7), ("stage_ms", {"total": {}}), ("stage_ms", {"total": {"p50": "x"}}),
+    ("batch", None), ("batch", {}), ("batch", {"made": None}), ("batch", {"made": {}, "seconds": "s", "notes": []}),
+    ("batch", {"made": {}, "seconds": float("nan"), "notes": []}),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("missing", [False, True])
+def test_a_result_that_was_edited_is_made_anew_and_the_user_learns_of_it(
+    missing: bool, words: list[object], tmp_path: Path, alone: list[Path]
+) -> None:
+    batch(*words[1:], "--out", tmp_path / "out")
+    (file,) = (tmp_path / "out").glob("*.json")
+    good, anew = json.loads(file.read_text()), 1
+    for name, value in EDITS:
+        edited = {key: one for key, one in good.items() if key != name} if missing else {**good, name: value}
+        file.write_text(json.dumps(edited))
+        result = batch(*words[1:], "--out", tmp_path / "out")
+        anew += 1
+        assert result.return_value == 0 and "1 recordings, 0 failed, 2 frames" in result.output
+        assert f"{file.name}: expected a result of a batch" in result.output and "it is made anew" in result.output
+        assert len(alone) == anew and told(tmp_path / "out") == {
+            file.name: {k: good[k] for k in good if k not in TIMES}
+        }
+
+
+def test_a_recording_that_fails_stops_no_other(words: list[object], tmp_path: Path, alone: list[Path]) -> None:
+    result = batch(tmp_path / "gone", *words[1:], "--out", tmp_path / "out")
+    assert result.return_value == 3 and "2 recordings, 1 failed, 2 frames" in result.output
+    table = pyarrow.parquet.read_table(tmp_path / "out/recordings.parquet").to_pylist()
+    assert [(row["name"], row["frames"]) for row in table] == [("gone", 0), ("b", 2)] and "gone" in table[0]["error"]
+    assert table[0]["error"] in result.output and "<h2>Failed</h2>" in (tmp_path / "out/report.html").read_text()
+
+
+def test_two_recordings_of_one_name_have_their_own_results(
+    words: list[object], tmp_path: Path, alone: list[Path]
+) -> None:
+    other = tum_folder(tmp_path / "elsewhere/b", frames=4)
+    assert "2 recordings, 0 failed, 6 frames" in batch(other, *words[1:], "--out", tmp_path / "out").output
+
+
+def test_a_store_that_all_would_share_is_refused(words: list[object], tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"registrar\.store: expected none"):
+        batch(*words, "--out", tmp_path / "out", "--set", f"registrar.store={tmp_path / 'store.db'}")

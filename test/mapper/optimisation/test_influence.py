@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What closures would cost without others is what they do cost in a map without these."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_mapper.constraint import Constraint
+from objreg_mapper.optimisation.edges import Edges, edges_of, squared_residuals
+from objreg_mapper.optimisation.incremental import IncrementalGraph
+from objreg_mapper.optimisation.influence import Influence
+from objreg_ros.data.checked import Array
+from objreg_ros.geometry import pose
+
+COUNT = 12
+
+
+def edge(k1: int, k2: int, sideways: float = 0.0, sigma: float = 0.02) -> Edges:
+    T = pose(np.eye(3), np.array([float(k2 - k1), sideways, 0.0]))
+    return edges_of([(k1, k2, Constraint(T, sigma**2 * np.eye(6)))])
+
+
+def joined(closures: list[Edges]) -> Edges:
+    whole = edges_of(())
+    for closure in closures:
+        whole = whole.joined(closure)
+    return whole
+
+
+def solved(closures: list[Edges]) -> tuple[IncrementalGraph, Array]:
+    graph = IncrementalGraph(np.eye(4))
+    places = np.array([pose(np.eye(3), np.array([float(k), 0.0, 0.0])) for k in range(1, COUNT)])
+    graph.grow(places, joined([edge(k, k + 1, sigma=0.1) for k in range(COUNT - 1)]))
+    graph.add(joined(closures))
+    return graph, graph.settle()
+
+
+@pytest.mark.parametrize("gone", [[], [1], [2, 3], [1, 2, 3]])
+def test_the_cost_without_some_is_that_in_a_map_without_them(gone: list[int]) -> None:
+    inside = [edge(0, 9, 0.01), edge(3, 11, 0.1), edge(2, 10, -0.05), edge(2, 9, -0.04)]
+    newest = edge(1, 8, 0.2)
+    graph, poses = solved(inside)
+    told = Influence(graph, poses, joined([*inside, newest]), [4, *range(4)]).expected_cost(4, gone)
+    without, there = solved([closure for k, closure in enumerate(inside) if k not in gone])
+    known = Influence(without, there, newest, [0]).expected_cost(0)
+    assert told == pytest.approx(known, rel=0.05)
+
+
+def test_a_closure_costs_more_where_the_map_knows_better() -> None:
+    loose, tight = solved([]), solved([edge(0, 11), edge(1, 10)])
+    newest = edge(0, 11, 0.3)
+    costs = [Influence(graph, poses, newest, [0]).expected_cost(0) for graph, poses in (loose, tight)]
+    assert costs[0] < 2.0 < 50.0 < costs[1]
+
+
+@pytest.mark.parametrize("gone", [[1], [2, 3]])
+def test_what_the_rest_costs_less_is_told(gone: list[int]) -> None:
+    inside = [edge(0, 9, 0.01), edge(3, 11, 0.1), edge(2, 10, -0.05), edge(2, 9, -0.04)]
+    graph, poses = solved(inside)
+    told = Influence(graph, poses, joined(inside), list(range(4))).relief(gone)
+    rest = [closure for k, closure in enumerate(inside) if k not in gone]
+    _, there = solved(rest)
+    odometry = joined([edge(k, k + 1, sigma=0.1) for k in range(COUNT - 1)])
+    before = squared_residuals(poses, odometry.joined(joined(inside))).sum()
+    assert told == pytest.approx(
+        before - squared_residuals(there, odometry.joined(joined(rest))).sum(), rel=0.05, abs=0.1
+    )
