@@ -83,12 +83,13 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> 
     return None if module_path.name == "__init__.py" else File.from_parent(parent, path=module_path)
 
 
-def _skipped_without_solver() -> Generator[None, object, object]:
-    """A test that solves a map skips where GTSAM, which is an extra, is not installed."""
+def _skipped_without_extra() -> Generator[None, object, object]:
+    """A test that solves a map, or runs the founding method, skips where GTSAM or Open3D, extras, are not installed."""
     try:
         return (yield)
-    except ImportError as error:
-        if find_spec("gtsam") is None and isinstance(error, ValueError):  # mapper's `MissingError`
+    except ValueError as error:
+        absent = [name for name in ("gtsam", "open3d") if find_spec(name) is None and f"expected {name}" in str(error)]
+        if absent:
             pytest.skip(str(error))
         raise
 
@@ -96,13 +97,13 @@ def _skipped_without_solver() -> Generator[None, object, object]:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup() -> Generator[None, object, object]:
     """Of the fixtures."""
-    return (yield from _skipped_without_solver())
+    return (yield from _skipped_without_extra())
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call() -> Generator[None, object, object]:
     """Of the test itself."""
-    return (yield from _skipped_without_solver())
+    return (yield from _skipped_without_extra())
 
 
 class Count:
