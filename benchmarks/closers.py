@@ -15,6 +15,7 @@ from sources import Source
 
 from objreg_mapper.pose_graph import PoseGraph
 from objreg_ros.data.checked import Array
+from objreg_ros.data.closure_fields import fields_of
 from objreg_ros.data.closures import UNTRIED, LoopClosure
 from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.geometry import inverse, rotation_angle
@@ -22,7 +23,6 @@ from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_tools.report.exports.export import constraint
 from objreg_tools.report.run.revisits import Revisit, Seen, recall_by_view_change, revisits
 from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 from objreg_tools.truth import FALSE, LOOSE, Truth, within
@@ -155,7 +155,7 @@ def judged(result: Result, source: Source, found: Sequence[Revisit]) -> dict[str
         "refused": dict(sorted(result.refused.items())),
         "rotation_deg": _median([error[0] for error in errors]),
         "translation_cm": _median([error[1] for error in errors]),
-        "closures": [constraint(closure) for closure in result.closures],
+        "closures": [fields_of(closure) for closure in result.closures],
     }
 
 

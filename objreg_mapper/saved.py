@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,8 @@ from objreg_mapper.optimisation.problem import End, Tie
 from objreg_mapper.params import MapperParams
 from objreg_mapper.pose_graph import PoseGraph
 from objreg_mapper.session import Session, stacked
-from objreg_ros import limits
 from objreg_ros.data.checked import Array
+from objreg_ros.data.closure_fields import closure_of, fields_of
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.whole_file import whole_file
 
@@ -30,37 +30,17 @@ BROKEN = (
 )  # what numpy, zipfile and json say of a file that is not whole
 
 
-def _labels(value: Any) -> tuple[str, ...]:
-    return tuple(str(label) for label in value)
-
-
-def _stamp(value: Any) -> int:
-    if type(value) is not int or not limits.LEAST_STAMP_NS <= value <= limits.MOST_STAMP_NS:
-        raise ValueError(f"closure: expected a stamp that ROS has, got {value!r}")
-    return value
-
-
-def _session(value: Any) -> int | None:
-    return None if value is None else int(value)
-
-
-KINDS: dict[str, Callable[[Any], Any]] = {
-    "from_ns": _stamp,
-    "to_ns": _stamp,
-    "labels": _labels,
-    "from_frame_id": str,
-    "to_frame_id": str,
-    "from_session": _session,
-    "to_session": _session,
-    "from_robot": str,
-    "to_robot": str,
-}  # of a closure: the member and what makes it of the value in a file
-OF_CLOSURES = "ends", "T_1_2", "covariances", "T_from_to", "closure_covariances"  # a row for each
+NUMBERS = {"T_from_to": "T_from_to", "covariance": "closure_covariances"}  # fields of a closure, in arrays of their own
+OF_CLOSURES = ("ends", "T_1_2", "covariances", *NUMBERS.values())  # a row for each
 
 
 def beside(graph_path: Path) -> Path:
     """Where the sessions of a map are whose g2o text is at ``graph_path``."""
     return graph_path.with_name(f"{graph_path.stem if graph_path.suffix != '.npz' else graph_path.name}.npz")
+
+
+def _without_numbers(closure: LoopClosure) -> dict[str, Any]:
+    return {name: value for name, value in fields_of(closure).items() if name not in NUMBERS}
 
 
 def packed(graph: PoseGraph) -> dict[str, Any]:
@@ -70,7 +50,7 @@ def packed(graph: PoseGraph) -> dict[str, Any]:
         "version": VERSIONS[-1],
         "names": [sorted(session.names) for session in graph.sessions],
         "robots": [session.robot for session in graph.sessions],
-        "closures": [{name: getattr(tie.closure, name) for name in KINDS} for tie in ties],
+        "closures": [_without_numbers(tie.closure) for tie in ties if tie.closure],
     }
     arrays: dict[str, Any] = {
         "told": np.frombuffer(json.dumps(header).encode(), np.uint8),
@@ -138,10 +118,8 @@ def _graph(header: Mapping[str, Any], arrays: Mapping[str, Array], params: Mappe
         session.names, session.robot = {int(name) for name in names}, str(robot)
         graph.sessions.append(session)
     for number, known in enumerate(header["closures"]):
-        known = {name: make(known[name]) for name, make in KINDS.items() if name in known}
-        T, C = arrays["T_from_to"][number], arrays["closure_covariances"][number]
+        closure = closure_of({**known, **{name: arrays[held][number] for name, held in NUMBERS.items()}})
         s1, k1, s2, k2 = arrays["ends"][number].tolist()
         constraint = Constraint(arrays["T_1_2"][number], arrays["covariances"][number])
-        closure = LoopClosure(T_from_to=T, covariance=C, **known)
         graph.restore(Tie(End(s1, k1), End(s2, k2), constraint, closure))
     return graph

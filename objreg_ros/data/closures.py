@@ -100,7 +100,7 @@ class LoopClosure:
     """Two keyframes that saw the same place: ``T_from_to`` maps points of the camera at *to* into the camera at *from*.
 
     ``covariance (6, 6) float64`` in ROS order [tx ty tz rx ry rz], of the pose in the *from* frame; ``labels`` of the
-    objects that closed it; ``matches`` those with their landmarks; ``evidence`` named numbers of the verification;
+    objects that closed it; ``objects`` those with their landmarks; ``evidence`` named numbers of the verification;
     ``from_frame_id`` and ``to_frame_id`` the names of the two cameras, which may be two of one robot; ``from_session``
     and ``to_session`` the runs of odometry that the keyframes belong to, None where it is not known; ``from_robot`` and
     ``to_robot`` the names of the robots whose runs these are, empty where they are not known.
@@ -111,7 +111,7 @@ class LoopClosure:
     T_from_to: Array
     covariance: Array
     labels: tuple[str, ...]
-    matches: tuple[ObjectMatch, ...] = ()
+    objects: tuple[ObjectMatch, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
     from_frame_id: str = "camera"
     to_frame_id: str = "camera"

@@ -15,6 +15,7 @@ import numpy as np
 
 from objreg_ros import limits
 from objreg_ros.data.checked import Array
+from objreg_ros.data.closure_fields import closure_of, fields_of
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import ObjectCloud, View
 from objreg_ros.data.images import Intrinsics
@@ -111,46 +112,23 @@ def object_row(number: int, item: KeyObject, sighting: Sighting) -> Row:
 
 
 def closure_row(number: int, closure: LoopClosure) -> Row:
-    """The columns of a closure, under its number in the store."""
+    """The columns of a closure, under its number in the store: its sessions, and all its fields as JSON."""
     row = {
         "id": int(number),
-        "from_ns": int(closure.from_ns),
-        "to_ns": int(closure.to_ns),
-        "from_frame_id": closure.from_frame_id,
-        "to_frame_id": closure.to_frame_id,
-        "from_robot": closure.from_robot,
-        "to_robot": closure.to_robot,
         "from_session": closure.from_session,
         "to_session": closure.to_session,
-        "T_from_to": _bytes(closure.T_from_to),
-        "covariance": _bytes(closure.covariance),
-        "labels": json.dumps(closure.labels),
-        "evidence": json.dumps(closure.evidence),
+        "fields": json.dumps(fields_of(closure)),
     }
     return sealed("closure", row)
 
 
 def closure_from_row(row: Mapping[str, Any]) -> LoopClosure:
-    """A closure from its row, without the registrations of its objects. ValueError if it is damaged."""
+    """A closure from its row; its objects have the ids that they had when it was written. ValueError if damaged."""
     require_sealed(f"closure {row['id']}", "closure", row)
     try:
-        labels, evidence = tuple(map(str, json.loads(row["labels"]))), dict(json.loads(row["evidence"]))
-    except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"closure {row['id']}: expected labels and evidence as JSON, got others ({error})") from error
-    return LoopClosure(
-        from_ns=row["from_ns"],
-        to_ns=row["to_ns"],
-        from_frame_id=row["from_frame_id"],
-        to_frame_id=row["to_frame_id"],
-        from_robot=row["from_robot"],
-        to_robot=row["to_robot"],
-        from_session=row["from_session"],
-        to_session=row["to_session"],
-        T_from_to=np.frombuffer(_bytes_of(row, "T_from_to", 128)).reshape(4, 4),
-        covariance=np.frombuffer(_bytes_of(row, "covariance", 288)).reshape(6, 6),
-        labels=labels,
-        evidence=evidence,
-    )
+        return closure_of(json.loads(row["fields"]))
+    except (TypeError, ValueError, RecursionError, AttributeError) as error:
+        raise ValueError(f"closure {row['id']}: expected its fields as JSON, got others ({error})") from error
 
 
 def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, Any]]) -> Keyframe:

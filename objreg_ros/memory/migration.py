@@ -6,22 +6,26 @@ Version 5 is that of 0.2.0, the first release: it knew of one robot only.
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from objreg_ros.data.closure_fields import closure_of
 from objreg_ros.memory.checksum import (
     require_head,
     require_keyframe,
     require_object,
     require_sealed,
-    sealed,
     sealed_keyframe,
     sealed_object,
 )
 from objreg_ros.memory.claim import Claim
+from objreg_ros.memory.codec import closure_row
 from objreg_ros.memory.counters import MOST_IDS, read_counters
 from objreg_ros.memory.store_file import OLDEST_VERSION, SCHEMA, SCHEMA_VERSION, bear, check, connect, read_only_uri
 
@@ -30,8 +34,11 @@ SEALS = ("seal", "whole", "cloud_crc")
 ADDED: dict[str, dict[str, Any]] = {  # what this version says besides, and what that is of the version of one robot
     "keyframe": {"robot": "", "origin": ""},
     "object": {},
-    "closure": {"from_robot": "", "to_robot": "", "from_session": None, "to_session": None},
 }
+CLOSURES = """CREATE TABLE closure (
+  id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL, from_frame_id TEXT NOT NULL,
+  to_frame_id TEXT NOT NULL, T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL,
+  evidence TEXT NOT NULL, seal INTEGER NOT NULL)"""  # a column for each field, in the version of one robot
 KINDS = {"INTEGER": int, "REAL": float, "TEXT": str, "BLOB": bytes}
 MOST = 2**53  # of a number in a row but stamps: those that are counted on from must not overflow
 COUNTED = ("id", "session", "keyframe", "landmark")
@@ -60,9 +67,9 @@ def _copy(source: sqlite3.Connection, target: sqlite3.Connection) -> None:
     counters = read_counters(source).emptied()  # the ids that were given are used up
     bear(target)
     with target as transaction:
-        for table, sealing in (("keyframe", sealed_keyframe), ("object", sealed_object), ("closure", _sealed_closure)):
+        for table, sealing in (("keyframe", sealed_keyframe), ("object", sealed_object), ("closure", _closure)):
             for row in _rows(source, table):
-                written = sealing({**row, **ADDED[table]})
+                written = sealing({**row, **ADDED.get(table, {})})
                 insert(transaction, table, written)
                 counters.enter(table, written)
                 counters.landmark = max(counters.landmark, row.get("landmark", 0))
@@ -77,8 +84,14 @@ def insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) 
     transaction.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values()))
 
 
-def _sealed_closure(row: Mapping[str, Any]) -> dict[str, Any]:
-    return sealed("closure", row)
+def _closure(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The row of a closure from one with a column for each field. ValueError where these are no closure's."""
+    fields = {name: value for name, value in row.items() if name != "id"}
+    for name, shape in (("T_from_to", (4, 4)), ("covariance", (6, 6))):
+        fields[name] = np.frombuffer(row[name]).reshape(shape)
+    for name in ("labels", "evidence"):
+        fields[name] = json.loads(row[name])
+    return closure_row(row["id"], closure_of(fields))
 
 
 def _rows(source: sqlite3.Connection, table: str) -> Iterator[dict[str, Any]]:
@@ -116,6 +129,7 @@ def _require_parts(source: sqlite3.Connection) -> None:
         for table, names in ADDED.items():
             for name in names:
                 model.execute(f"ALTER TABLE {table} DROP COLUMN {name}")
+        model.executescript(f"DROP TABLE closure; {CLOSURES};")
         wanted, got = _parts(model), _parts(source)
     if wanted != got:
         first = sorted(wanted ^ got)[0]

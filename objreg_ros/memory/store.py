@@ -137,7 +137,7 @@ class Store:
                 yield sighting_from_row(row, self._heads[row["keyframe"]])
 
     def closures(self) -> Iterator[LoopClosure]:
-        """Every stored closure, oldest first, without the registrations of its objects."""
+        """Every stored closure, oldest first; its objects have the ids that they had when it was stored."""
         with self._reporting("read the closures"):
             yield from map(closure_from_row, self._connection.execute("SELECT * FROM closure ORDER BY id"))
 

@@ -39,11 +39,7 @@ CREATE TABLE object (
 CREATE INDEX object_of_keyframe ON object (keyframe);
 CREATE INDEX object_of_landmark ON object (landmark);
 CREATE TABLE closure (
-  id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL,
-  from_frame_id TEXT NOT NULL, to_frame_id TEXT NOT NULL, from_robot TEXT NOT NULL, to_robot TEXT NOT NULL,
-  from_session INTEGER, to_session INTEGER,
-  T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL, evidence TEXT NOT NULL,
-  seal INTEGER NOT NULL);
+  id INTEGER PRIMARY KEY, from_session INTEGER, to_session INTEGER, fields TEXT NOT NULL, seal INTEGER NOT NULL);
 CREATE TABLE books (
   id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL, object INTEGER NOT NULL, closure INTEGER NOT NULL,
   landmark INTEGER NOT NULL, keyframe_rows INTEGER NOT NULL, object_rows INTEGER NOT NULL,

@@ -64,9 +64,9 @@ class Waiting:
         """The same under the ids that its objects have by now, by their instance in the later keyframe."""
         matches = tuple(
             replace(match, object_id=landmarks.get(here, match.object_id))
-            for match, (here, _) in zip(self.closure.matches, self.pairs, strict=True)
+            for match, (here, _) in zip(self.closure.objects, self.pairs, strict=True)
         )
-        return replace(self, closure=replace(self.closure, matches=matches))
+        return replace(self, closure=replace(self.closure, objects=matches))
 
     def refused(self, refusal: Refusal) -> Rejected:
         """The refusal that it comes to."""
@@ -124,7 +124,7 @@ def closure_of(
         T_from_to=candidate.T_target_source,
         covariance=covariance_of(candidate, params),
         labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
-        matches=matches,
+        objects=matches,
         evidence=evidence_of(candidate) | _moved(keyframe, item) | support_evidence(item.support),
         from_frame_id=item.target.frame_id,
         to_frame_id=keyframe.frame_id,

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data.checked import Array
+from objreg_ros.data.closure_fields import fields_of
 from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.data.frames import Frame
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.segmenter.sensor.sensor_estimate import Lag
 from objreg_tools.offline.stages import Registers
-from objreg_tools.report.exports.export import constraint
 from objreg_tools.truth import Truth, summarise
 
 
@@ -65,7 +65,7 @@ class Run:
             "gravity": self.gravity(),
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
             "truth": summarise(truth.errors(self.closures)),
-            "refusals": [refusal_with_evidence(rejected) for rejected in self.refusals],
+            "refusals": [fields_of(rejected) for rejected in self.refusals],
             "glimpses": self.glimpses,
         }
 
@@ -83,21 +83,9 @@ def constraint_with_error(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
     """A closure as JSON, with its true ``error``: None where the truth is not known."""
     error = truth.error(closure)
     return {
-        **constraint(closure),
+        **fields_of(closure),
         "error": None if error is None else dict(zip(("rotation_deg", "translation_cm"), error, strict=True)),
     }
-
-
-def refusal(rejected: Rejected) -> dict[str, Any]:
-    """A refused candidate as JSON."""
-    pose = None if rejected.T_from_to is None else rejected.T_from_to.round(6).tolist()
-    stamps = {"from_ns": rejected.from_ns, "to_ns": rejected.to_ns, "T_from_to": pose}
-    return {"reason": rejected.reason.value, **stamps, "detail": rejected.detail}
-
-
-def refusal_with_evidence(rejected: Rejected) -> dict[str, Any]:
-    """A refused candidate as JSON, with the named numbers that were read of its pose."""
-    return {**refusal(rejected), "evidence": rejected.evidence}
 
 
 def glimpse(frame: Frame, labels: tuple[str, ...]) -> dict[str, Any]:

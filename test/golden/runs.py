@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from objreg_ros.data.closure_fields import fields_of
 from objreg_ros.data.closures import Rejected
 from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.registrar.params import RegistrarParams
@@ -22,7 +23,6 @@ from objreg_tools.offline.run import Run
 from objreg_tools.offline.stages import Detects, Stages
 from objreg_tools.recording import open_recording
 from objreg_tools.recording.inputs import choose_inputs
-from objreg_tools.report.exports.export import constraint
 from objreg_tools.simulation.write import simulate
 
 FOLDER = Path(__file__).resolve().parent
@@ -109,7 +109,7 @@ def results(run: Run) -> dict[str, Any]:
     told = {
         "frames": run.frames,
         "dropped": dict(sorted(run.dropped.items())),
-        "constraints": [constraint(closure) for closure in run.closures],
+        "constraints": [fields_of(closure) for closure in run.closures],
         "refusals": [refusal(rejected) for rejected in run.refusals],
     }
     return json.loads(json.dumps(told))  # as it is read from a file

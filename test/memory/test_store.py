@@ -421,12 +421,7 @@ DAMAGED_KEYFRAMES: dict[str, object] = {
     "whole": 7,
 }
 DAMAGED_HEADS: dict[str, object] = {"session": 3, "stamp_ns": 5, "travelled": 1.0, "by_odometry": 2, "seal": 1}
-DAMAGED_CLOSURES: dict[str, object] = {
-    "from_ns": 9,
-    "labels": '["cap"]',
-    "T_from_to": NAN.tobytes(),
-    "to_frame_id": "x",
-}
+DAMAGED_CLOSURES: dict[str, object] = {"fields": '{"from_ns": 9}', "to_session": 9}
 CLOSURE = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",))
 
 

@@ -31,7 +31,7 @@ def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved(
         target=replace(there, frame_id="front"), candidate=candidate(matched=pairs[:2], moved=pairs[2:])
     )
     closure = closure_of(here, sightings, accepted, PARAMS)
-    assert closure.labels == ("cup",) and [match.object_id for match in closure.matches] == [7, 8]
+    assert closure.labels == ("cup",) and [match.object_id for match in closure.objects] == [7, 8]
     assert closure.moved == {"cup": pytest.approx(0.5)}
     assert (closure.from_ns, closure.to_ns) == (there.stamp_ns, here.stamp_ns)
     assert (closure.from_frame_id, closure.to_frame_id) == ("front", "camera")

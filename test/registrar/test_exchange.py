@@ -135,7 +135,7 @@ def test_what_is_fetched_is_not_stored_and_its_objects_go_by_our_landmarks() -> 
     outcome = a.fetches(b.sees(30, BESIDE), b)
     assert outcome is not None
     (closure,) = outcome.closures
-    assert len(closure.matches) == 2 and {match.object_id for match in closure.matches} <= set(known)
+    assert len(closure.objects) == 2 and {match.object_id for match in closure.objects} <= set(known)
     assert {landmark.landmark: landmark.sightings for landmark in a.registrar.landmarks} == known
     assert a.registrar.counts()["keyframes"] == 1 and a.registrar.counts()["closures"] == 1
 
@@ -350,7 +350,7 @@ def test_what_waits_for_others_is_published_late_by_our_landmarks() -> None:
         assert k or a.registrar.waiting == 1
     (late,) = [one for one in closures if one.to_ns == 30 * SECOND]
     assert late.evidence["agreeing"] >= 3 and late.robots == ("a", "b") and a.registrar.waiting == 0
-    assert {match.object_id for match in late.matches} <= {one.landmark for one in a.registrar.landmarks}
+    assert {match.object_id for match in late.objects} <= {one.landmark for one in a.registrar.landmarks}
     assert 30 * SECOND in [stored.to_ns for stored in a.registrar._store.closures()]
 
 

@@ -39,7 +39,7 @@ def test_a_keyframe_that_closes_a_loop_has_the_landmarks_of_the_stored_one() -> 
     recollection = _begun()
     (closure,), named = recollection.remember(NEW, sightings_of(NEW), [_accepted()])
     assert [sighting.landmark for sighting in named] == [2, 1]
-    assert [(match.label, match.object_id) for match in closure.matches] == [("book", 2), ("cup", 1)]
+    assert [(match.label, match.object_id) for match in closure.objects] == [("book", 2), ("cup", 1)]
     assert len(recollection.index) == 4 and len(recollection.landmarks) == 2
     assert len(list(recollection.store.closures())) == 1
 
@@ -58,7 +58,7 @@ def test_it_is_the_same_when_the_store_is_opened_again(tmp_path: Path) -> None:
 def test_a_closure_to_a_keyframe_of_others_goes_by_our_landmarks_and_leaves_them_as_they_are() -> None:
     recollection = _begun()
     (closure,) = recollection.remember_closures(THEIRS, [_accepted()])
-    assert [(match.label, match.object_id) for match in closure.matches] == [("book", 2), ("cup", 1)]
+    assert [(match.label, match.object_id) for match in closure.objects] == [("book", 2), ("cup", 1)]
     assert closure.robots == ("", "b") and (closure.from_session, closure.to_session) == (0, 7)
     assert recollection.store.keyframe_ids() == [1] and len(recollection.index) == 2
     assert [one.sightings for one in recollection.landmarks.known()] == [1, 1]
@@ -93,7 +93,7 @@ def test_a_late_closure_joins_what_it_says_is_one() -> None:
     late = waiting_of(NEW, named, _accepted(), (Reason.NEIGHBOURS, "alone"), PARAMS)
     settled, ends = recollection.remember_late(late)
     assert ends is not None and [end.keyframe_id for end in ends] == [2, 1]
-    assert [match.object_id for match in settled.closure.matches] == [2, 1] and len(recollection.landmarks) == 2
+    assert [match.object_id for match in settled.closure.objects] == [2, 1] and len(recollection.landmarks) == 2
 
 
 def test_a_late_closure_to_others_has_the_landmarks_of_the_stored_one_and_no_keyframes() -> None:
@@ -101,7 +101,7 @@ def test_a_late_closure_to_others_has_the_landmarks_of_the_stored_one_and_no_key
     named = tuple(one.of_landmark(0, np.eye(3)) for one in sightings_of(THEIRS))
     late = waiting_of(THEIRS, named, _accepted(), (Reason.NEIGHBOURS, "alone"), PARAMS)
     settled, ends = recollection.remember_late(late)
-    assert ends is None and [match.object_id for match in settled.closure.matches] == [2, 1]
+    assert ends is None and [match.object_id for match in settled.closure.objects] == [2, 1]
     assert len(list(recollection.store.closures())) == 1
 
 

@@ -77,8 +77,8 @@ def test_its_objects_are_matched_under_ids_that_were_known_before(
 ) -> None:
     closure = next(c for c in revisit[0] if c.from_ns == 0)
     known = {landmark.landmark: landmark for landmark in revisit[2].landmarks}
-    assert closure.matches and all(match.object_id in known for match in closure.matches)
-    assert all(known[match.object_id].sightings >= 2 for match in closure.matches)
+    assert closure.objects and all(match.object_id in known for match in closure.objects)
+    assert all(known[match.object_id].sightings >= 2 for match in closure.objects)
 
 
 def test_the_first_keyframe_has_no_candidate(revisit: tuple[list[LoopClosure], list[Rejected], Registrar]) -> None:
@@ -99,8 +99,8 @@ def test_an_object_that_is_met_again_is_observed_under_the_id_that_it_had() -> N
     outcomes = [registrar.process(frame) for frame in (_frame(0, HERE), _frame(30, BESIDE))] + [registrar.finish()]
     first, second = ({seen.object_id: seen.label for seen in o.observations} for o in outcomes if o.observations)
     (closure,) = outcomes[-1].closures
-    assert closure.matches and min(first) >= 1
-    for match in closure.matches:
+    assert closure.objects and min(first) >= 1
+    for match in closure.objects:
         assert first[match.object_id] == second[match.object_id] == match.label
 
 
@@ -386,7 +386,7 @@ def test_what_a_keyframe_cannot_prove_is_published_late_with_its_own_stamps_when
     (late,) = [c for o in outcomes for c in o.closures if c.to_ns == first]
     assert late.evidence["agreeing"] == 3 and registrar.waiting == 0
     known = {landmark.landmark for landmark in registrar.landmarks}
-    assert late.matches and {match.object_id for match in late.matches} <= known
+    assert late.objects and {match.object_id for match in late.objects} <= known
     assert registrar.counts()["closures"] == sum(len(o.closures) for o in outcomes)
 
 

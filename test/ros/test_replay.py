@@ -191,7 +191,7 @@ def test_objreg_msgs_tell_the_same_as_the_topics_of_common_interfaces_and_more(f
         assert (mine.from_ns, mine.to_ns) == (theirs.from_ns, theirs.to_ns)
         assert (mine.from_frame_id, mine.to_frame_id) == (theirs.from_frame_id, theirs.to_frame_id)
         assert np.array_equal(mine.T_from_to, theirs.T_from_to) and np.array_equal(mine.covariance, theirs.covariance)
-        assert mine.evidence["odds"] > 1 and mine.matches and (mine.from_session, mine.to_session) == (0, 0)
+        assert mine.evidence["odds"] > 1 and mine.objects and (mine.from_session, mine.to_session) == (0, 0)
     told = [refusal_of(status) for message in fresh.received["refusals"] for status in message.status]
     whole = [closures_msg.read_refusal(message) for message in fresh.received["closure_refusals"]]
     assert [(w.reason, w.to_ns, w.detail) for w in whole] == [(t.reason, t.to_ns, t.detail) for t in told]

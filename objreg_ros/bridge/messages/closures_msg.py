@@ -54,7 +54,7 @@ def loop_closure(closure: LoopClosure, robot: str = "") -> Any:
         from_moment=_moment(closure.from_ns, closure.from_frame_id, closure.from_session, robots[0]),
         to_moment=_moment(closure.to_ns, closure.to_frame_id, closure.to_session, robots[1]),
         labels=list(closure.labels),
-        objects=[ObjectMatchMsg(label=match.label, landmark_id=match.object_id) for match in closure.matches],
+        objects=[ObjectMatchMsg(label=match.label, landmark_id=match.object_id) for match in closure.objects],
         evidence=_evidence(closure.evidence),
     )
     message.pose.pose = to_msg.pose(closure.T_from_to)
@@ -135,7 +135,7 @@ def read_loop_closure(message: Any) -> LoopClosure:
         T_from_to=motion_from_msg.motion(message),
         covariance=np.asarray(message.pose.covariance, np.float64).reshape(6, 6),
         labels=tuple(headers.bounded(label, "label") for label in message.labels),
-        matches=tuple(
+        objects=tuple(
             ObjectMatch(label=headers.bounded(match.label, "label"), object_id=int(match.landmark_id))
             for match in message.objects
         ),

@@ -309,7 +309,7 @@ def transforms(closure: LoopClosure) -> list[TransformStamped]:
     The child frame is ``"<moment(to)>/<label>_<id of the landmark>"``.
     """
     parent, child = _moments(closure)
-    names = [f"{child}/{match.label}_{match.object_id}" for match in closure.matches]
+    names = [f"{child}/{match.label}_{match.object_id}" for match in closure.objects]
     return [transform(closure.T_from_to, closure.to_ns, parent, name) for name in names]
 
 

@@ -16,6 +16,7 @@ import click
 from objreg_ros import share
 from objreg_ros.bridge.camera.calibration import absolute
 from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers
+from objreg_ros.data.closure_fields import fields_of
 from objreg_ros.data.images import ColourImage, Intrinsics
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import quaternion_from_rotation
@@ -29,7 +30,7 @@ from objreg_tools.cli.played import as_rosbag2, simulated_room
 from objreg_tools.cli.run_output import closing_lines, exit_code, notify, print_reasons
 from objreg_tools.cli.settings import parse_change, print_ignored, read_settings, ros_argument
 from objreg_tools.cli.verbosity import aside
-from objreg_tools.offline.run import constraint_with_error, refusal_with_evidence
+from objreg_tools.offline.run import constraint_with_error
 from objreg_tools.recording import Recording, open_recording
 from objreg_tools.recording.camera_from_text import with_camera
 from objreg_tools.recording.inputs import Inputs, choose_inputs, parse_remaps
@@ -237,7 +238,7 @@ def summary_of(status: Mapping[str, Any], live: Live, truth: Truth) -> dict[str,
         "constraints": [constraint_with_error(closure, truth) for closure in live.closures],
         "rejected": dict(live.rejected),
         "truth": summarise(truth.errors(live.closures)),
-        "refusals": [refusal_with_evidence(rejected) for rejected in live.refusals],
+        "refusals": [fields_of(rejected) for rejected in live.refusals],
         "glimpses": live.glimpses,
     }
 

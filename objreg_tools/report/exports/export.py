@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.closure_fields import fields_of
 from objreg_ros.geometry import rotate, transform
 from objreg_ros.memory.landmarks import Landmark, Landmarks
 from objreg_ros.memory.sighting import Sighting
@@ -63,7 +63,7 @@ def _write(store: Store, folder: Path, notify: Callable[[str], None]) -> Iterato
         keyframes.append(_keyframe_json(keyframe, sightings))
         seen += sightings
     landmarks = [_landmark_json(known) for known in Landmarks(RegistrarParams(), seen).known()]
-    closures = [_closure_json(closure) for closure in store.closures()]
+    closures = [fields_of(closure) for closure in store.closures()]
     content = {"keyframes": keyframes, "landmarks": landmarks, "closures": closures, "damaged": damaged}
     yield _write_json(folder / "map.json", content)
 
@@ -143,25 +143,6 @@ def _landmark_json(known: Landmark) -> dict[str, Any]:
         "stamp_ns": known.stamp_ns,
         "position": known.position.tolist(),
         "sightings": known.sightings,
-    }
-
-
-def _closure_json(closure: LoopClosure) -> dict[str, Any]:
-    """A closure as it is stored: without the poses of single objects, with its cameras."""
-    fields = {name: value for name, value in constraint(closure).items() if name != "objects"}
-    return {**fields, "from_frame_id": closure.from_frame_id, "to_frame_id": closure.to_frame_id}
-
-
-def constraint(closure: LoopClosure) -> dict[str, Any]:
-    """A closure as JSON."""
-    return {
-        "from_ns": closure.from_ns,
-        "to_ns": closure.to_ns,
-        "T_from_to": closure.T_from_to.tolist(),
-        "covariance": closure.covariance.tolist(),
-        "labels": list(closure.labels),
-        "objects": [{"label": match.label, "object_id": match.object_id} for match in closure.matches],
-        "evidence": closure.evidence,
     }
 
 

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
+from objreg_ros.data import closure_fields
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.data.frames import Odometry
 from objreg_tools.report.run.camera_map import TrackedFrame
 
@@ -91,55 +92,27 @@ def _place(xyz: Any) -> Array:
     return place
 
 
-def _tried_pose(pose: Any) -> Array | None:
-    """A refused pose (4, 4), which may not be rigid; None where there is none."""
-    if pose is None:
-        return None
-    T = np.array(pose, float)
-    if T.shape != (4, 4):
-        raise ValueError(f"expected a pose of 4 x 4 numbers, got {T.shape}")
-    return T if np.isfinite(T).all() else None
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"expected text, got {value!r}")
-    return value
-
-
 def _rigid(pose: Any, stamp_ns: int) -> Array:
     """The pose (4, 4); ValueError if it is none."""
     return Odometry(T_odom_body=np.array(pose, float), stamp_ns=stamp_ns).T_odom_body
 
 
 def closure_of(row: Mapping[str, Any]) -> LoopClosure:
-    """A closure, without the sessions of its keyframes; ValueError where it is none."""
-    return LoopClosure(
-        from_ns=_stamp(row["from_ns"]),
-        to_ns=_stamp(row["to_ns"]),
-        T_from_to=np.array(row["T_from_to"], float),
-        covariance=np.array(row["covariance"], float),
-        labels=tuple(map(_spaced, row["labels"])),
-        evidence=_evidence(row),
-    )
+    """A closure with its labels as they read on a page; ValueError where it is none."""
+    closure = closure_fields.closure_of(row)
+    return replace(closure, labels=tuple(map(_spaced, closure.labels)), evidence=_spaced_names(closure.evidence))
 
 
-def _evidence(row: Mapping[str, Any]) -> dict[str, float]:
-    return {_spaced(name): float(number) for name, number in row.get("evidence", {}).items()}
+def refusal_of(row: Mapping[str, Any]) -> Rejected:
+    """A refused pair; ValueError where it is none."""
+    rejected = closure_fields.rejected_of(row)
+    return replace(rejected, evidence=_spaced_names(rejected.evidence))
+
+
+def _spaced_names(evidence: Mapping[str, float]) -> dict[str, float]:
+    return {_spaced(name): number for name, number in evidence.items()}
 
 
 def _spaced(label: str) -> str:
     """A label as it reads on a page."""
     return label.replace("_", " ")
-
-
-def refusal_of(row: Mapping[str, Any]) -> Rejected:
-    """A refused pair; ValueError where it is none."""
-    return Rejected(
-        reason=Reason(row["reason"]),
-        from_ns=_stamp(row["from_ns"]),
-        to_ns=_stamp(row["to_ns"]),
-        detail=_text(row["detail"]),
-        T_from_to=_tried_pose(row.get("T_from_to")),
-        evidence=_evidence(row),
-    )

@@ -71,8 +71,7 @@ class RunSummary:
         closures = read_rows(name, summary, "constraints", closure_of)
         refusals, by_tracking = read_rows(name, summary, "refusals", refusal_of), summary.get("odometry") == TRACKED
         frames = [frame for _, frame in advancing(glimpses, by_tracking)]
-        if by_tracking:
-            closures = with_sessions(closures, frames)
+        closures = with_sessions(closures, frames)
         made = CameraMap.of(frames, closures, MapperParams.of_tracking() if by_tracking else None)
         return cls(name, summary, truth, glimpses, closures, refusals, made, made.pruned)
 

@@ -26,7 +26,7 @@ CLOSURE = LoopClosure(
     T_from_to=T,
     covariance=np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]) + 0.1,
     labels=("cup", "tv"),
-    matches=(ObjectMatch(label="cup", object_id=3), ObjectMatch(label="tv", object_id=2**32 - 2)),
+    objects=(ObjectMatch(label="cup", object_id=3), ObjectMatch(label="tv", object_id=2**32 - 2)),
     evidence={"score": 0.75, "moved cup [m]": 1.5},
     from_frame_id="front",
     to_frame_id="kinect",
@@ -145,7 +145,7 @@ def test_a_message_without_a_pose_or_with_an_unknown_reason_is_refused() -> None
 def test_the_id_of_a_closure_is_that_of_its_moments_and_of_its_robot() -> None:
     first = closures_msg.closure_id(CLOSURE, "robot1")
     assert str(uuid.UUID(first)) == first
-    again = replace(CLOSURE, evidence={}, matches=(), T_from_to=np.eye(4))
+    again = replace(CLOSURE, evidence={}, objects=(), T_from_to=np.eye(4))
     assert closures_msg.closure_id(again, "robot1") == first
     others = [replace(CLOSURE, **{name: 77}) for name in ("from_ns", "to_ns", "from_session", "to_session")]
     others += [replace(CLOSURE, from_frame_id="rear"), replace(CLOSURE, to_frame_id="rear")]

@@ -62,7 +62,7 @@ def closure(*matches: ObjectMatch) -> LoopClosure:
         T_from_to=pose(rotation_from_vector(np.array([0.1, -2.0, 0.3])), np.array([1.0, 2.0, 3.0])),
         covariance=A @ A.T + np.eye(6),
         labels=("cup",),
-        matches=matches,
+        objects=matches,
         from_frame_id="front",
         to_frame_id="kinect",
     )

@@ -61,7 +61,9 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
     ]
     assert np.allclose(content["landmarks"][0]["position"], [5.0, 0.0, 1.0], atol=0.05)
     (told,) = content["closures"]
-    assert told["to_ns"] == 2 and told["from_frame_id"] == "camera" and "objects" not in told
+    assert (
+        told["to_ns"] == 2 and told["from_frame_id"] == "camera" and told["from_robot"] == "" and told["objects"] == []
+    )
 
 
 def test_two_objects_of_a_keyframe_are_two_files_even_where_they_are_one_landmark(tmp_path: Path) -> None:
