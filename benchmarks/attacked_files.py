@@ -94,7 +94,7 @@ def write_store(path: Path) -> None:
             keyframe = make_keyframe(store.next_keyframe(), draw, 30)
             tie = LoopClosure(
                 from_ns=k, to_ns=k + 10**9, T_from_to=np.eye(4), covariance=np.eye(6) * 1e-4, labels=("cup",),
-                evidence={"texture": 0.5 + k},
+                evidence={"correlation": 0.5 + k},
             )  # fmt: skip
             sightings = [s.of_landmark(8 * k + n + 1, np.eye(3)) for n, s in enumerate(sightings_of(keyframe))]
             store.add(keyframe, sightings, [tie])

@@ -164,7 +164,9 @@ def rows_of(
         if one.verification.score < least:
             break
         refused = check_rules(one, prior) is not None
-        readings = (np.nan if reading is None else reading for reading in readings_of(one).values())
+        readings = (
+            np.nan if reading is None else KINDS[name].scaled(reading) for name, reading in readings_of(one).items()
+        )
         yield (*pose_error(one.T_target_source, T_true), refused, pair, rank, *readings)
 
 

@@ -39,14 +39,14 @@ class Verification:
 
     Of the ``tested`` pixels that land in the other view (both ways together), ``inliers`` is the share whose depth
     agrees, ``violations`` the share that floats in space which the other view saw to be free, ``occluded`` the share
-    hidden behind something. ``texture`` is the correlation -1..1 of the high-passed grey of the inliers, None without
+    hidden behind something. ``correlation`` is that, -1..1, of the high-passed grey of the inliers, None without
     grey. ``score`` is V: higher is better, and above 0 is more evidence for than against.
     """
 
     inliers: float
     violations: float
     occluded: float
-    texture: float | None
+    correlation: float | None
     tested: int
     score: float
 
@@ -70,8 +70,8 @@ class Candidate:
     ``matched`` are the object pairs that lie upon each other under it, ``moved`` those of the same kind that should and
     do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it, None
     where one is unknown; ``silhouette_score`` is that of the matched objects, -1..1, None where it is unknown, and
-    ``silhouette_score_nearby`` that of each a little aside, where it looks most alike: what it is, if not where;
-    ``yaw_known`` says that the shape of one of them fixes its yaw; ``margin_over_competing`` is how much higher the
+    ``silhouettes`` that of each a little aside, where it looks most alike: what it is, if not where;
+    ``yaw_known`` says that the shape of one of them fixes its yaw; ``score_margin`` is how much higher the
     candidate scores than any other. ``perturbation_margin`` is the score margin over the pose perturbed to where it
     would be false, along the directions in which it is known least; None where it is known well enough without.
     ``surroundings`` is what the views say of it without the objects that it matches; None where those are small in
@@ -89,9 +89,9 @@ class Candidate:
     gravity_error_deg: float | None = None
     gravity_error_sigmas: float = 0.0
     silhouette_score: float | None = None
-    silhouette_score_nearby: float | None = None
+    silhouettes: float | None = None
     yaw_known: bool = False
-    margin_over_competing: float = 0.0
+    score_margin: float = 0.0
     perturbation_margin: float | None = None
     surroundings: Verification | None = None
     certain_violations: float = 1.0

@@ -199,4 +199,4 @@ def merged(candidates: list[Candidate], middle: Array) -> list[Candidate]:
             proposers = {proposer for j in np.flatnonzero(same) for proposer in ranked[j].agreeing_proposers}
             kept.append(replace(candidate, agreeing_proposers=tuple(sorted(proposers))))
             known |= same
-    return [replace(candidate, margin_over_competing=margin_over(candidate, kept)) for candidate in kept]
+    return [replace(candidate, score_margin=margin_over(candidate, kept)) for candidate in kept]

@@ -11,7 +11,8 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import Reason
 from objreg_ros.geometry import skew
 from objreg_ros.registration.candidate import Candidate
-from objreg_ros.registration.gate.likelihood import odds_of
+from objreg_ros.registration.gate.kinds import readings_of
+from objreg_ros.registration.gate.likelihood import log_odds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,25 +57,22 @@ class Registration:
 
 
 def evidence_of(candidate: Candidate) -> dict[str, float]:
-    """The numbers of the verification, for whoever wants to look at a pose."""
-    seen, aligned = candidate.verification, candidate.alignment
+    """The numbers of a candidate: its odds, the reading of each of the gate's `KINDS`, and what else is known of it.
+
+    The odds are those of the readings: `log_odds` of these numbers gives them again. What is not known is left out.
+    """
+    readings, seen = readings_of(candidate), candidate.verification
     numbers: dict[str, float | None] = {
-        "odds": odds_of(candidate),
+        "odds": 10.0 ** log_odds(readings),
+        **readings,
         "score": seen.score,
         "inliers": seen.inliers,
         "violations": seen.violations,
-        "certain_violations": candidate.certain_violations,
         "occluded": seen.occluded,
         "keypoints": None if candidate.keypoints is None else candidate.keypoints.cells,
-        "correlation": seen.texture,
-        "tested": seen.tested,
-        "overlap": aligned.overlap,
-        "rmse": aligned.rmse,
-        "proposers": len(candidate.agreeing_proposers),
-        "matched": len(candidate.matched),
+        "overlap": candidate.alignment.overlap,
         "moved": len(candidate.moved),
         "gravity_error_deg": candidate.gravity_error_deg,
-        "perturbation_margin": candidate.perturbation_margin,
         "surroundings_score": None if candidate.surroundings is None else candidate.surroundings.score,
         "yaw_known": candidate.yaw_known,
     }

@@ -22,7 +22,7 @@ from registrar.test_consistency import ASIDE, TRUE, passes
 
 PARAMS = RegistrarParams(confirm_seconds=10.0)
 THINGS = (box("cup", (0.0, 0.0, 1.0)), box("book", (0.3, 0.0, 1.0), instance=2))
-DOUBTFUL = {"texture": 0.1, "tested": 2000, "perturbation_margin": 0.1}
+DOUBTFUL = {"correlation": 0.1, "tested": 2000, "perturbation_margin": 0.1}
 
 
 def tried(at_m: float, T: Array = TRUE, by_odometry: bool = True, **evidence: object) -> Tried:
@@ -129,7 +129,7 @@ def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_
 
 
 @pytest.mark.parametrize(
-    "evidence", [{"certain_violations": 0.2}, {"converged": False}, {"texture": -0.9, "tested": 50}]
+    "evidence", [{"certain_violations": 0.2}, {"converged": False}, {"correlation": -0.9, "tested": 50}]
 )
 def test_what_is_impossible_or_unlikely_never_waits(evidence: dict[str, object]) -> None:
     confirmation = Confirmation(PARAMS)
@@ -141,7 +141,7 @@ def test_what_is_impossible_or_unlikely_never_waits(evidence: dict[str, object])
 
 @pytest.mark.parametrize(("margin", "kind"), [(0.01, Rejected), (0.03, Held)])
 def test_what_nothing_holds_is_not_confirmed_by_neighbours_that_slide_alike(margin: float, kind: type) -> None:
-    loose = {**DOUBTFUL, "texture": 0.3, "perturbation_margin": margin}
+    loose = {**DOUBTFUL, "correlation": 0.3, "perturbation_margin": margin}
     assert isinstance(Confirmation(PARAMS).receive(tried(0.4, **loose)), kind)
 
 

@@ -336,7 +336,7 @@ def test_no_time_refuses_as_over_budget() -> None:
 
 
 def test_what_waits_for_others_is_published_late_by_our_landmarks() -> None:
-    method, doubts = Knowing(), {"texture": 0.1, "tested": 2000, "perturbation_margin": 0.1}
+    method, doubts = Knowing(), {"correlation": 0.1, "tested": 2000, "perturbation_margin": 0.1}
     params = PARAMS.replaced(thin_seconds=0.1, closures=1, candidates=1)
     a, b = Robot("a", params, method), Robot("b", params)
     sides = [rooms.look_at((0.2, 0.2 * side, 1.3), (1.8, 0.0, 0.75)) for side in (-1.0, 0.0, 1.0, 2.0)]

@@ -357,7 +357,7 @@ class Odometrical:
         """Nothing to make ready."""
 
     def propose(self, source: Any, target: Any, prior: object = None) -> tuple:
-        doubts = {"texture": 0.1, "tested": 2000, "perturbation_margin": 0.1}
+        doubts = {"correlation": 0.1, "tested": 2000, "perturbation_margin": 0.1}
         T = inverse(target.T_odom_camera) @ source.T_odom_camera
         pairs = tuple(
             ObjectPair(a, b, one.label)

@@ -102,7 +102,7 @@ def moved(x: float, y: float = 0.0, z: float = 0.0) -> Array:
 
 def candidate(T: Array | None = None, **evidence: object) -> Candidate:
     """A candidate that is most likely right, and breaks no rule, but for what is given otherwise."""
-    seen = {"inliers": 0.9, "violations": 0.01, "occluded": 0.05, "texture": 0.6, "tested": 9000, "score": 0.8}
+    seen = {"inliers": 0.9, "violations": 0.01, "occluded": 0.05, "correlation": 0.6, "tested": 9000, "score": 0.8}
     seen.update({name: evidence.pop(name) for name in list(evidence) if name in seen})
     information = evidence.pop("information", np.diag([1e5] * 3 + [1e5] * 3))
     alignment = Alignment(
@@ -122,9 +122,9 @@ def candidate(T: Array | None = None, **evidence: object) -> Candidate:
         "matched": (ObjectPair(0, 0, "cup"), ObjectPair(1, 1, "book")),
         "gravity_error_deg": 0.5,
         "certain_violations": 0.0,
-        "margin_over_competing": 1.0,
+        "score_margin": 1.0,
         "perturbation_margin": 0.6,
-        "silhouette_score_nearby": evidence.get("silhouette_score"),
+        "silhouettes": evidence.get("silhouette_score"),
     }
     rest.update(evidence)
     return Candidate(alignment=alignment, verification=Verification(**seen), **rest)

@@ -30,10 +30,8 @@ def test_a_candidate_of_which_only_the_views_speak_well_is_refused() -> None:
 def test_what_is_not_known_of_a_candidate_does_not_speak_for_it() -> None:
     one = bare()
     assert one.matched == one.moved == ()
-    assert (
-        one.gravity_error_deg is one.silhouette_score is one.silhouette_score_nearby is one.perturbation_margin is None
-    )
-    assert (one.yaw_known, one.margin_over_competing, one.certain_violations) == (False, 0.0, 1.0)
+    assert one.gravity_error_deg is one.silhouette_score is one.silhouettes is one.perturbation_margin is None
+    assert (one.yaw_known, one.score_margin, one.certain_violations) == (False, 0.0, 1.0)
 
 
 def test_no_two_candidates_share_the_covariance_that_a_warp_adds() -> None:

@@ -160,7 +160,7 @@ def test_the_competitors_of_promising_candidates_are_ranked_with_them(monkeypatc
     assert np.array_equal(found[0].T_target_source, competitor.T_target_source) and len(found) > 1
     least = max(LEAST_SCORE, max(one.verification.score for one in asked) - CONSIDERED_MARGIN)
     assert asked and all(one.verification.score >= least for one in asked)
-    assert found[0].margin_over_competing < 9.0  # another one is known
+    assert found[0].score_margin < 9.0  # another one is known
 
 
 def test_what_is_held_has_no_degenerate_direction_at_all() -> None:
@@ -208,7 +208,7 @@ def test_without_gravity_and_grey_there_is_still_a_pose(engine: Engine) -> None:
     best = engine.propose(source, target)[0]
     rotation, distance = pose_error(best.T_target_source, inverse(seen_from(15.0)) @ seen_from(0.0))
     assert rotation < 1.5 and distance < 3.0
-    assert best.verification.texture is None and best.gravity_error_deg is None
+    assert best.verification.correlation is None and best.gravity_error_deg is None
 
 
 def test_an_empty_keyframe_proposes_nothing(engine: Engine) -> None:

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from objreg_ros.data.closures import Reason
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from_rotation
 from objreg_ros.registration.candidate import KeypointAgreement
+from objreg_ros.registration.gate.kinds import KINDS, readings_of
+from objreg_ros.registration.gate.likelihood import log_odds, odds_of
 from objreg_ros.registration.result import Registration, evidence_of
 from registration.samples import candidate
 
@@ -45,5 +48,13 @@ def test_evidence_has_in_how_many_cells_keypoints_agree_where_there_are_any() ->
 
 
 def test_evidence_leaves_out_what_is_not_known() -> None:
-    assert "texture" not in evidence_of(candidate(texture=None))
+    assert "correlation" not in evidence_of(candidate(correlation=None))
     assert evidence_of(candidate(score=0.5))["score"] == 0.5
+
+
+def test_the_published_odds_follow_from_the_published_evidence() -> None:
+    known, unknown = candidate(keypoints=None), candidate(correlation=None, silhouettes=None, perturbation_margin=None)
+    for one in (known, unknown, candidate(tested=50, score_margin=-1.0)):
+        evidence = evidence_of(one)
+        assert 10.0 ** log_odds(evidence) == pytest.approx(evidence["odds"]) == pytest.approx(odds_of(one))
+        assert set(KINDS) - set(evidence) == {name for name, reading in readings_of(one).items() if reading is None}

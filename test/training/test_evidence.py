@@ -31,7 +31,7 @@ def test_every_scenario_is_seen_by_every_sensor_in_every_rig_in_a_room_of_its_ow
 
 def test_a_row_has_the_error_whether_a_rule_refuses_and_the_readings() -> None:
     ((degrees, cm, refused, pair, rank, *readings),) = rows_of(
-        (candidate(moved(0.1), texture=None),), None, np.eye(4), 3
+        (candidate(moved(0.1), correlation=None),), None, np.eye(4), 3
     )
     assert (degrees, cm) == pytest.approx((0.0, 10.0)) and not refused and (pair, rank) == (3, 0)
     assert len(readings) == len(KINDS) and np.isnan(readings[list(KINDS).index("correlation")])

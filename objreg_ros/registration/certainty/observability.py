@@ -20,7 +20,7 @@ from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.refine.photometric_icp import finish
 from objreg_ros.registration.score.comparison import score_gain, score_locally
 from objreg_ros.registration.score.object_matches import match_objects
-from objreg_ros.registration.score.photometric import texture
+from objreg_ros.registration.score.photometric import correlate_views
 from objreg_ros.registration.score.view_score import LEAST_SCORE, RANKING_POINTS, score_views, verify
 
 PERTURBATIONS_M = (0.05, 0.1, 0.15)  # how far a pose is moved along a direction to see whether V falls
@@ -143,7 +143,7 @@ def regularising_information(source: Prepared, target: Prepared, T_target_source
     known, added = np.linalg.inv(C), np.zeros((6, 6))
     if not (source.sight.textured and target.sight.textured):
         return added
-    if texture(source.sight, target.sight, T_target_source) < HOLDING_CORRELATION:
+    if correlate_views(source.sight, target.sight, T_target_source) < HOLDING_CORRELATION:
         return added
     perturbed_score, left = PerturbedScore(source, target, T_target_source), np.eye(3)
     for _ in range(3):  # every direction once: the views say the same of it again

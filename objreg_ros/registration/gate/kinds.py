@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kinds of evidence that the likelihood weighs: how each is read, and between which values its weight changes.
 
-A reading is a plain number, or None where it is not known. Depth tolerances have grown with the noise of the cameras
-before anything is read (`objreg_ros/sensor.py`), so a reading means the same for every camera. What a reading weighs is
-fitted (`weights`); here stands only its direction: a weight never falls where the evidence gets better.
+A reading is a plain number, or None where it is not known. It is published under the name of its kind. Depth tolerances
+have grown with the noise of the cameras before anything is read (`objreg_ros/sensor.py`), so a reading means the same
+for every camera. What a reading weighs is fitted (`weights`); here stands only its direction: a weight never falls
+where the evidence gets better.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ class Kind(NamedTuple):
     rises: bool  # whether more of it supports a pose
     reason: Reason  # of a refusal for want of it
     phrase: str  # what a refusal calls it
+    scaled: Callable[[float], float] = float  # from a reading to what the knots are in
 
 
 AS_CALIBRATED = RegistrationParams(covariance_calibration=0.01)  # a camera's own; a user's changes no verdict
@@ -44,6 +46,10 @@ def _scaled_sigma(one: Candidate) -> float:
     return worst_translation(covariance_of(one, AS_CALIBRATED))
 
 
+def _decimal_logarithm(count: float) -> float:
+    return log10(max(1.0, count))
+
+
 def _range(one: Candidate) -> float:
     """The mean distance in m of both cameras from the middle of what is seen."""
     middle, eye = one.alignment.middle, one.T_target_source[:3, 3]
@@ -52,19 +58,19 @@ def _range(one: Candidate) -> float:
 
 KINDS = {
     "tested": Kind(
-        lambda one: log10(max(1, one.verification.tested)),
-        (2.8, 3.0, 3.3, 3.7, 4.2), True, Reason.LOW_OVERLAP, "pixels that both views see, 10 to the power of",
+        lambda one: float(one.verification.tested),
+        (2.8, 3.0, 3.3, 3.7, 4.2), True, Reason.LOW_OVERLAP, "pixels that both views see", _decimal_logarithm,
     ),
     "certain_violations": Kind(
         lambda one: one.certain_violations,
         (0.0, 0.001, 0.003, 0.006, 0.012, 0.025), False, Reason.FREE_SPACE, "certain violations",
     ),
     "correlation": Kind(
-        lambda one: one.verification.texture,
+        lambda one: one.verification.correlation,
         (-0.1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.65), True, Reason.TEXTURE, "correlation of grey",
     ),
     "silhouettes": Kind(
-        lambda one: one.silhouette_score_nearby,
+        lambda one: one.silhouettes,
         (-0.5, -0.2, 0.0, 0.2, 0.5), True, Reason.PROPOSERS_DISAGREE, "silhouette score",
     ),
     "matched": Kind(
@@ -76,7 +82,7 @@ KINDS = {
         (1.0, 2.0, 3.0), True, Reason.PROPOSERS_DISAGREE, "independent proposers",
     ),
     "score_margin": Kind(
-        lambda one: one.margin_over_competing,
+        lambda one: one.score_margin,
         (-0.2, 0.0, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0), True, Reason.PROPOSERS_DISAGREE, "lead over another possible pose",
     ),
     "perturbation_margin": Kind(

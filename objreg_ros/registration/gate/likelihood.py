@@ -29,13 +29,16 @@ def odds_of(candidate: Candidate) -> float:
 
 
 def log_odds(readings: Mapping[str, float | None]) -> float:
-    """The decimal logarithm of the odds that a pose with such readings is right."""
-    return PRIOR + sum(weigh(name, reading) for name, reading in readings.items())
+    """The decimal logarithm of the odds that a pose with such readings is right; a kind that is missing is unknown."""
+    return PRIOR + sum(weigh(name, readings.get(name)) for name in KINDS)
 
 
 def weigh(name: str, reading: float | None) -> float:
-    """The weight of a reading of one kind of evidence."""
-    return UNKNOWN[name] if reading is None else float(np.interp(reading, KINDS[name].knots, WEIGHTS[name]))
+    """The weight of a reading of one kind of evidence; 0 of a kind that no fit has seen yet."""
+    kind = KINDS[name]
+    if name not in WEIGHTS:
+        return 0.0
+    return UNKNOWN[name] if reading is None else float(np.interp(kind.scaled(reading), kind.knots, WEIGHTS[name]))
 
 
 def check(candidate: Candidate, least_odds: float) -> Refusal | None:
@@ -44,7 +47,7 @@ def check(candidate: Candidate, least_odds: float) -> Refusal | None:
     found = log_odds(readings)
     if found >= log10(least_odds):
         return None
-    lacking = {name: max(WEIGHTS[name]) - weigh(name, reading) for name, reading in readings.items()}
+    lacking = {name: max(WEIGHTS[name]) - weigh(name, reading) for name, reading in readings.items() if name in WEIGHTS}
     worst = max(lacking, key=lambda name: lacking[name])
     reading = readings[worst]
     value = "unknown" if reading is None else f"{reading:.3g}"

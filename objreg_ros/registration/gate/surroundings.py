@@ -40,7 +40,7 @@ def check(
         return None
     refusal = (
         _check_overlap(around, limits)
-        or _check_loss(around.texture, whole.texture, limits.correlation_loss)
+        or _check_loss(around.correlation, whole.correlation, limits.correlation_loss)
         or (_check_score(around.score, limits.score) if lone else None)
     )
     return refusal and (refusal[0], f"without the {' and the '.join(labels)} {refusal[1]}")

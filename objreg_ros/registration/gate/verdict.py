@@ -56,7 +56,7 @@ def judge(candidates: Sequence[Candidate], prior: Prior | None = None, limits: L
 def compared(candidates: Sequence[Candidate], limits: Limits = LIMITS) -> list[Candidate]:
     """The candidates with their margins over those only that keep gravity: the others are no poses of one room."""
     possible = [one for one in candidates if _check_gravity(one, limits) is None]
-    return [replace(one, margin_over_competing=margin_over(one, possible)) for one in candidates]
+    return [replace(one, score_margin=margin_over(one, possible)) for one in candidates]
 
 
 def refuse(one: Candidate, prior: Prior | None = None, limits: Limits = LIMITS) -> Refusal | None:
@@ -89,7 +89,7 @@ def check_alone(one: Candidate, limits: Limits = LIMITS) -> Refusal | None:
         or surroundings.check(
             one.surroundings, one.verification, labels, objects.is_lone(one.matched), limits.surroundings
         )
-        or competing.check(one.margin_over_competing, limits.score_margin)
+        or competing.check(one.score_margin, limits.score_margin)
         or observability.check(len(one.alignment.degenerate))
     )
 

@@ -39,7 +39,7 @@ def gather(source: Prepared, target: Prepared, alignment: Alignment, proposers: 
         matched=matched,
         moved=moved,
         silhouette_score=score_matched_silhouettes(source, target, matched, T),
-        silhouette_score_nearby=score_matched_silhouettes(source, target, matched, T, NEARBY_M),
+        silhouettes=score_matched_silhouettes(source, target, matched, T, NEARBY_M),
         yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in matched),
         gravity_error_deg=gravity.degrees,
         gravity_error_sigmas=gravity.sigmas,

@@ -73,7 +73,7 @@ def _finished(source: Prepared, target: Prepared, T: Array) -> tuple[Array, Arra
         if gained < 0.0:
             break
         best, T = found, finished
-        grey_information = grey if (found.seen.texture or 0.0) >= HOLDING_CORRELATION else np.zeros((6, 6))
+        grey_information = grey if (found.seen.correlation or 0.0) >= HOLDING_CORRELATION else np.zeros((6, 6))
         if gained < LITTLE:
             break
     return T, grey_information

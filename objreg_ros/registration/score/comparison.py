@@ -52,6 +52,6 @@ def _doubt(seen: Verification) -> float:
     The log likelihood of jointly Gaussian greys that correlate by r over n points, -n/2 log(1 - r^2), changes by
     n r / (1 - r^2) with r. The n points are those that lie on a surface of both.
     """
-    r, n = min(max(seen.texture or 0.0, 0.0), 1.0), seen.inliers * seen.tested
+    r, n = min(max(seen.correlation or 0.0, 0.0), 1.0), seen.inliers * seen.tested
     known, enough = n * r, TELLING_GREY * (1.0 - r**2)
     return enough / known if known > enough else 1.0

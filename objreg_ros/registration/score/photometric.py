@@ -29,7 +29,7 @@ LAYERS = 5  # that are summed in a window: where there is grey, either grey, and
 OURS, THEIRS = [SUM_A, SUM_AA], [SUM_B, SUM_BB]
 
 
-def texture(source: Sight, target: Sight, T_target_source: Array) -> float:
+def correlate_views(source: Sight, target: Sight, T_target_source: Array) -> float:
     """The correlation -1..1 over what both see, both ways; 0 where that is next to nothing. Both must have grey."""
     forward = compare(source, target, T_target_source)
     backward = compare(target, source, inverse(T_target_source))

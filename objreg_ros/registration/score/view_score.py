@@ -15,7 +15,7 @@ from objreg_ros.geometry import inverse, inverses
 from objreg_ros.registration.candidate import Verification
 from objreg_ros.registration.prepare.views import Sight
 from objreg_ros.registration.score.free_space import INLIERS, OCCLUDED, SEEN, VIOLATIONS, correlation, count, count_many
-from objreg_ros.registration.score.photometric import NARROW, compare, texture
+from objreg_ros.registration.score.photometric import NARROW, compare, correlate_views
 from objreg_ros.sensor import depth_tolerance
 
 RANKING_POINTS = 500  # a side, of the views, by which hypotheses are ranked
@@ -39,13 +39,13 @@ def verify(source: Sight, target: Sight, T_target_source: Array, sample: int | N
         count_visibility(target, source, inverse(T_target_source), sample),
     )
     if min(way[SEEN] for way in ways) < 1:
-        return Verification(inliers=0.0, violations=1.0, occluded=0.0, texture=None, tested=0, score=WORST)
+        return Verification(inliers=0.0, violations=1.0, occluded=0.0, correlation=None, tested=0, score=WORST)
     grey = _grey(source, target, T_target_source, None if sample is None else ways[0] + ways[1])
     return Verification(
         inliers=float(min(way[INLIERS] / way[SEEN] for way in ways)),
         violations=float(max(way[VIOLATIONS] / way[SEEN] for way in ways)),
         occluded=float(max(way[OCCLUDED] / way[SEEN] for way in ways)),
-        texture=grey,
+        correlation=grey,
         tested=int(ways[0][SEEN] + ways[1][SEEN]),
         score=float(rated(ways[0], ways[1], NO_TEXTURE if grey is None else grey, _asked(source, target, sample))),
     )
@@ -55,7 +55,7 @@ def _grey(source: Sight, target: Sight, T: Array, counts: Array | None) -> float
     """How the grey correlates, by ``counts`` where there are some; None for a view without grey."""
     if not (source.textured and target.textured):
         return None
-    return texture(source, target, T) if counts is None else float(correlation(counts))
+    return correlate_views(source, target, T) if counts is None else float(correlation(counts))
 
 
 def score_views(source: Sight, target: Sight, T_target_source: Array, sample: int) -> Array:

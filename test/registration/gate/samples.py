@@ -11,8 +11,8 @@ CUP = ObjectPair(0, 0, "cup")
 
 def lone(**evidence: object) -> Candidate:
     """A candidate of one object that no second proposer confirms, in a plain room."""
-    alone = {"matched": (ObjectPair(0, 0, "cup"),), "agreeing_proposers": ("objects",), "texture": 0.4}
-    return candidate(**{**alone, "silhouette_score": 0.6, "yaw_known": True, "margin_over_competing": 0.4, **evidence})
+    alone = {"matched": (ObjectPair(0, 0, "cup"),), "agreeing_proposers": ("objects",), "correlation": 0.4}
+    return candidate(**{**alone, "silhouette_score": 0.6, "yaw_known": True, "score_margin": 0.4, **evidence})
 
 
 def competitor(one: Candidate, behind: float, **evidence: object) -> Candidate:

@@ -21,7 +21,7 @@ def test_a_refusal_says_how_near_the_other_pose_comes() -> None:
 
 
 def test_a_likely_pose_is_refused_where_another_one_scores_as_much() -> None:
-    refusal = refuse(candidate(margin_over_competing=competing.LEAST_MARGIN - 0.01))
+    refusal = refuse(candidate(score_margin=competing.LEAST_MARGIN - 0.01))
     assert refusal is not None and refusal[0] is Reason.PROPOSERS_DISAGREE
 
 

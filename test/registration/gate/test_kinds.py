@@ -15,16 +15,16 @@ CUPS = tuple(ObjectPair(k, k, "cup") for k in range(3))
 
 def test_a_reading_is_the_candidate_s_own_number_or_unknown() -> None:
     for evidence, name, reading in [
-        ({"tested": 1000}, "tested", 3.0),
+        ({"tested": 1000}, "tested", 1000.0),
         ({"tested": 0}, "tested", 0.0),
         ({"certain_violations": 0.01}, "certain_violations", 0.01),
-        ({"texture": 0.4}, "correlation", 0.4),
-        ({"texture": None}, "correlation", None),
-        ({"silhouette_score_nearby": -0.5}, "silhouettes", -0.5),
-        ({"silhouette_score_nearby": None}, "silhouettes", None),
+        ({"correlation": 0.4}, "correlation", 0.4),
+        ({"correlation": None}, "correlation", None),
+        ({"silhouettes": -0.5}, "silhouettes", -0.5),
+        ({"silhouettes": None}, "silhouettes", None),
         ({"matched": CUPS}, "matched", 3.0),
         ({"agreeing_proposers": ("centroids", "objects", "odometry")}, "proposers", 1.0),
-        ({"margin_over_competing": 0.3}, "score_margin", 0.3),
+        ({"score_margin": 0.3}, "score_margin", 0.3),
         ({"perturbation_margin": 0.2}, "perturbation_margin", 0.2),
         ({"perturbation_margin": None}, "perturbation_margin", None),
         ({"systematic_depth_error": 0.09 * np.eye(6)}, "position_sigma", pytest.approx(0.3, rel=0.01)),

@@ -34,13 +34,13 @@ def test_what_is_unknown_has_a_weight_of_its_own() -> None:
 
 
 def test_weights_add_up_to_the_logarithm_of_the_odds() -> None:
-    one = candidate(certain_violations=0.001, texture=0.65)
+    one = candidate(certain_violations=0.001, correlation=0.65)
     assert log_odds(readings_of(one)) == pytest.approx(0.5 + 0.5 + 1.0)
     assert odds_of(one) == pytest.approx(100.0)
 
 
 def test_a_pose_is_refused_below_the_least_odds_for_what_it_lacks_most() -> None:
-    one = candidate(certain_violations=0.025, texture=0.65)
+    one = candidate(certain_violations=0.025, correlation=0.65)
     assert check(one, 0.01) is None
     refusal = check(one, 100.0)
     assert refusal is not None
@@ -50,5 +50,12 @@ def test_a_pose_is_refused_below_the_least_odds_for_what_it_lacks_most() -> None
 
 
 def test_a_refusal_says_that_what_it_lacks_is_unknown() -> None:
-    refusal = check(candidate(certain_violations=0.0, texture=None, matched=(CUP,)), 1e6)
+    refusal = check(candidate(certain_violations=0.0, correlation=None, matched=(CUP,)), 1e6)
     assert refusal is not None and refusal == (Reason.TEXTURE, "odds 18 < 1e+06, most for correlation of grey unknown")
+
+
+def test_a_kind_that_no_fit_has_seen_weighs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = candidate()
+    before = log_odds(readings_of(one))
+    monkeypatch.setitem(KINDS, "new", KINDS["rmse"])
+    assert log_odds(readings_of(one)) == before and check(candidate(tested=10, correlation=-0.5), 1e6) is not None

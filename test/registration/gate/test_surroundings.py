@@ -16,7 +16,7 @@ from registration.gate.samples import CUP
 from registration.samples import candidate
 
 LIMITS = surroundings.Limits(tested=600, inliers=0.35, correlation_loss=0.25, score=0.25)
-SEEN = Verification(inliers=0.9, violations=0.0, occluded=0.0, texture=0.6, tested=9000, score=0.8)
+SEEN = Verification(inliers=0.9, violations=0.0, occluded=0.0, correlation=0.6, tested=9000, score=0.8)
 
 
 @pytest.mark.parametrize(
@@ -26,8 +26,8 @@ SEEN = Verification(inliers=0.9, violations=0.0, occluded=0.0, texture=0.6, test
         ({"score": 0.24}, Reason.LOW_OVERLAP),
         ({"tested": 599}, Reason.LOW_OVERLAP),
         ({"inliers": 0.3}, Reason.LOW_OVERLAP),
-        ({"texture": 0.34}, Reason.TEXTURE),
-        ({"texture": None}, None),
+        ({"correlation": 0.34}, Reason.TEXTURE),
+        ({"correlation": None}, None),
     ],
 )
 def test_surroundings_are_asked_for_what_whole_views_are(around: dict[str, float], reason: Reason | None) -> None:
@@ -50,7 +50,7 @@ def test_only_around_a_lone_object_must_the_views_score() -> None:
 @pytest.mark.parametrize(
     ("around", "reason"),
     [
-        ({"texture": -0.1}, Reason.TEXTURE),
+        ({"correlation": -0.1}, Reason.TEXTURE),
         ({"inliers": 0.5 * GATE.surroundings.inliers}, Reason.LOW_OVERLAP),
         ({"tested": GATE.surroundings.tested - 1}, Reason.LOW_OVERLAP),
         ({}, None),
@@ -60,9 +60,7 @@ def test_only_around_a_lone_object_must_the_views_score() -> None:
 def test_what_is_around_few_objects_must_agree_by_itself(
     around: dict[str, float], reason: Reason | None, matched: tuple[ObjectPair, ...]
 ) -> None:
-    few = candidate(
-        matched=matched, margin_over_competing=1.0, surroundings=replace(candidate().verification, **around)
-    )
+    few = candidate(matched=matched, score_margin=1.0, surroundings=replace(candidate().verification, **around))
     refusal = refuse(few)
     assert (None if refusal is None else refusal[0]) is reason
     assert refusal is None or refusal[1].startswith(
@@ -76,16 +74,16 @@ def test_few_objects_around_which_the_print_agrees_much_less_have_moved(
     matched: tuple[ObjectPair, ...], proposers: tuple[str, ...]
 ) -> None:
     def judged(around: float | None, whole: float | None = 0.6) -> object:
-        seen = replace(candidate().verification, texture=whole)
+        seen = replace(candidate().verification, correlation=whole)
         told = {
             "matched": matched,
             "agreeing_proposers": proposers,
-            "margin_over_competing": 1.0,
+            "score_margin": 1.0,
             "yaw_known": True,
             "silhouette_score": 0.9,
         }
-        surroundings = replace(seen, texture=around)
-        return refuse(candidate(**told, texture=whole, perturbation_margin=1.0, surroundings=surroundings))
+        surroundings = replace(seen, correlation=around)
+        return refuse(candidate(**told, correlation=whole, perturbation_margin=1.0, surroundings=surroundings))
 
     assert judged(0.6 - 0.9 * GATE.surroundings.correlation_loss) is None
     assert judged(0.99) is None
@@ -100,7 +98,7 @@ def test_a_lone_object_whose_surroundings_score_little_has_moved_whoever_propose
 ) -> None:
     def judged(score: float, *matched: ObjectPair) -> object:
         around = replace(candidate().verification, score=score)
-        told = {"margin_over_competing": 1.0, "perturbation_margin": 1.0, "yaw_known": True}
+        told = {"score_margin": 1.0, "perturbation_margin": 1.0, "yaw_known": True}
         return refuse(candidate(matched=matched, agreeing_proposers=proposers, surroundings=around, **told))
 
     least = GATE.surroundings.score

@@ -31,7 +31,7 @@ def test_a_candidate_that_nothing_speaks_against_is_accepted() -> None:
         ({"matched": (), "moved": (CUP,)}, Reason.MOVED),
         ({"matched": ()}, Reason.FEW_OBJECTS),
         ({"degenerate": np.eye(6)[:1]}, Reason.SLACK),
-        ({"texture": -0.2, "tested": 100, "perturbation_margin": 0.0}, Reason.TEXTURE),
+        ({"correlation": -0.2, "tested": 100, "perturbation_margin": 0.0}, Reason.TEXTURE),
         ({"information": np.diag([1.0, 1e5, 1e5, 1e5, 1e5, 1e5]), "perturbation_margin": 0.0}, Reason.SLACK),
     ],
 )
@@ -42,12 +42,12 @@ def test_a_broken_rule_and_small_odds_refuse_with_their_numbers(evidence: dict[s
 
 
 def test_what_refuses_by_its_odds_breaks_no_rule() -> None:
-    unlikely = candidate(texture=-0.2, tested=100, perturbation_margin=0.0)
+    unlikely = candidate(correlation=-0.2, tested=100, perturbation_margin=0.0)
     assert check_rules(unlikely) is None and refuse(unlikely) is not None
 
 
 def test_a_candidate_without_grey_or_gravity_is_judged_by_the_rest() -> None:
-    assert refuse(candidate(texture=None, gravity_error_deg=None)) is None
+    assert refuse(candidate(correlation=None, gravity_error_deg=None)) is None
 
 
 def test_a_user_s_least_odds_decide() -> None:
@@ -69,7 +69,7 @@ def test_the_second_candidate_is_taken_when_the_first_is_refused() -> None:
 
 
 def test_the_refusal_is_that_of_the_best_candidate() -> None:
-    verdict = judge((candidate(violations=0.4), candidate(texture=-1.0)))
+    verdict = judge((candidate(violations=0.4), candidate(correlation=-1.0)))
     assert isinstance(verdict, tuple) and verdict[0] is Reason.FREE_SPACE
 
 
@@ -92,8 +92,8 @@ def test_an_alias_does_not_stand_in_for_a_refused_best_candidate() -> None:
 def test_a_pose_that_does_not_keep_gravity_is_no_rival() -> None:
     one = lone()
     alone, beside = compared((one, competitor(one, 0.05)))[0], compared((one, competitor(one, 0.05, **TILTED)))[0]
-    assert alone.margin_over_competing == pytest.approx(0.05)
-    assert beside.margin_over_competing == compared((one,))[0].margin_over_competing > 1.0
+    assert alone.score_margin == pytest.approx(0.05)
+    assert beside.score_margin == compared((one,))[0].score_margin > 1.0
 
 
 def test_a_rival_makes_a_pose_less_likely() -> None:

@@ -74,7 +74,7 @@ def rightwards(monkeypatch):
     def seen_by(points: int) -> None:
         def verify(source, target, T, sample=None):
             score = 0.5 + T[0, 3] - TRUTH[0, 3]
-            return Verification(inliers=1.0, violations=0.0, occluded=0.0, texture=0.8, tested=points, score=score)
+            return Verification(inliers=1.0, violations=0.0, occluded=0.0, correlation=0.8, tested=points, score=score)
 
         monkeypatch.setattr("objreg_ros.registration.propose.refinement.finish", shifted)
         monkeypatch.setattr("objreg_ros.registration.score.comparison.verify", verify)

@@ -25,8 +25,10 @@ def round_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(comparison, "SILHOUETTE_WEIGHT", 0.5)
 
 
-def scored(score: float, silhouette_score: float, texture: float | None = 0.9, points: int = 5000) -> LocalScore:
-    seen = Verification(inliers=0.5, violations=0.0, occluded=0.5, texture=texture, tested=2 * points, score=score)
+def scored(score: float, silhouette_score: float, correlation: float | None = 0.9, points: int = 5000) -> LocalScore:
+    seen = Verification(
+        inliers=0.5, violations=0.0, occluded=0.5, correlation=correlation, tested=2 * points, score=score
+    )
     return LocalScore(seen, silhouette_score)
 
 
@@ -43,30 +45,30 @@ def test_where_much_grey_correlates_objects_do_not_outvote_it() -> None:
     assert score_gain(scored(1.05, 0.4), scored(1.0, 1.0)) > 0.0
 
 
-@pytest.mark.parametrize(("texture", "points"), [(0.9, 200), (0.3, 2000), (0.0, 5000), (-0.2, 5000), (None, 5000)])
-def test_where_grey_says_little_objects_have_their_whole_say(texture: float | None, points: int) -> None:
-    alike, unlike = scored(1.0, 1.0, texture, points), scored(1.05, 0.4, texture, points)
+@pytest.mark.parametrize(("correlation", "points"), [(0.9, 200), (0.3, 2000), (0.0, 5000), (-0.2, 5000), (None, 5000)])
+def test_where_grey_says_little_objects_have_their_whole_say(correlation: float | None, points: int) -> None:
+    alike, unlike = scored(1.0, 1.0, correlation, points), scored(1.05, 0.4, correlation, points)
     assert score_gain(unlike, alike) == pytest.approx(0.05 - 0.5 * 0.6)
 
 
 def test_the_say_of_objects_falls_with_what_the_grey_tells(monkeypatch: pytest.MonkeyPatch) -> None:
     """The more points of grey, and the better it correlates: 1000 (1 - r^2) / (n r) of it is left."""
-    alike, unlike = (scored(1.0, silhouette_score, texture=0.5, points=3000) for silhouette_score in (1.0, 0.0))
+    alike, unlike = (scored(1.0, silhouette_score, correlation=0.5, points=3000) for silhouette_score in (1.0, 0.0))
     assert score_gain(alike, unlike) == pytest.approx(0.5 * 1000 * 0.75 / 1500)
     monkeypatch.setattr(comparison, "TELLING_GREY", 2000.0)
     assert score_gain(alike, unlike) == pytest.approx(0.5 * 2000 * 0.75 / 1500)
 
 
 def test_grey_that_is_the_same_leaves_objects_no_say() -> None:
-    assert score_gain(scored(1.0, 1.0, texture=1.0), scored(1.0, 0.0, texture=1.0)) == 0.0
+    assert score_gain(scored(1.0, 1.0, correlation=1.0), scored(1.0, 0.0, correlation=1.0)) == 0.0
 
 
 def test_the_surer_grey_speaks_for_both_and_one_gains_what_the_other_loses() -> None:
-    sure, doubtful = scored(1.0, 0.3, texture=0.8, points=5000), scored(1.0, 0.9, texture=0.1)
+    sure, doubtful = scored(1.0, 0.3, correlation=0.8, points=5000), scored(1.0, 0.9, correlation=0.1)
     assert score_gain(doubtful, sure) == pytest.approx(0.5 * 0.6 * 1000 * 0.36 / 4000)
     assert score_gain(sure, doubtful) == pytest.approx(-score_gain(doubtful, sure))
 
 
 def test_views_that_do_not_meet_leave_all_to_the_objects() -> None:
-    unlike, alike = (scored(-3.0, silhouette_score, texture=None, points=0) for silhouette_score in (0.0, 1.0))
+    unlike, alike = (scored(-3.0, silhouette_score, correlation=None, points=0) for silhouette_score in (0.0, 1.0))
     assert score_gain(alike, unlike) == pytest.approx(0.5)

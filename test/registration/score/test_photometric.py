@@ -11,7 +11,7 @@ import pytest
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.registration.prepare.views import Sight, prepare_sight
 from objreg_ros.registration.score.free_space import SHADED, correlation
-from objreg_ros.registration.score.photometric import NARROW, WINDOW, _mirrored, compare, texture
+from objreg_ros.registration.score.photometric import NARROW, WINDOW, _mirrored, compare, correlate_views
 from objreg_ros.registration.score.view_score import verify
 from registration.rooms import keyframe, seen_from
 
@@ -28,24 +28,26 @@ def between(source: float, target: float) -> np.ndarray:
 
 
 def test_a_view_is_its_own_print() -> None:
-    assert texture(sight(0.0), sight(0.0), np.eye(4)) > 0.99
+    assert correlate_views(sight(0.0), sight(0.0), np.eye(4)) > 0.99
 
 
 @pytest.mark.parametrize("angle", [60.0, 90.0])
 def test_a_print_is_known_again_from_the_side_better_than_by_each_image_s_own_bands(angle: float) -> None:
     pair, T = (sight(0.0), sight(angle)), between(0.0, angle)
-    own_bands = verify(*pair, T, sample=100_000).texture
+    own_bands = verify(*pair, T, sample=100_000).correlation
     assert own_bands is not None
-    assert texture(*pair, T) > own_bands + 0.1
+    assert correlate_views(*pair, T) > own_bands + 0.1
 
 
 def test_a_print_that_is_shifted_does_not_correlate() -> None:
     shifted = pose(np.eye(3), np.array([0.08, 0.0, 0.0])) @ between(0.0, 25.0)
-    assert texture(sight(0.0), sight(25.0), shifted) < 0.5 * texture(sight(0.0), sight(25.0), between(0.0, 25.0))
+    assert correlate_views(sight(0.0), sight(25.0), shifted) < 0.5 * correlate_views(
+        sight(0.0), sight(25.0), between(0.0, 25.0)
+    )
 
 
 def test_a_darker_picture_has_the_same_print() -> None:
-    bright, dark = (texture(sight(0.0), sight(25.0, by), between(0.0, 25.0)) for by in (1.0, 0.5))
+    bright, dark = (correlate_views(sight(0.0), sight(25.0, by), between(0.0, 25.0)) for by in (1.0, 0.5))
     assert dark == pytest.approx(bright, abs=0.02)
 
 
@@ -57,12 +59,12 @@ def test_what_is_mirrored_beyond_the_rim_is_of_the_picture_however_small_that_is
 
 def test_both_ways_round_give_the_same_texture() -> None:
     pair, T = (sight(0.0), sight(25.0)), between(0.0, 25.0)
-    assert texture(*pair, T) == pytest.approx(texture(*pair[::-1], inverse(T)), abs=1e-6)
+    assert correlate_views(*pair, T) == pytest.approx(correlate_views(*pair[::-1], inverse(T)), abs=1e-6)
 
 
 def test_views_that_do_not_meet_have_no_texture() -> None:
     away = pose(rotation_from_vector(np.array([0.0, np.pi, 0.0])), np.zeros(3))
-    assert texture(sight(0.0), sight(25.0), away) == 0.0
+    assert correlate_views(sight(0.0), sight(25.0), away) == 0.0
 
 
 def test_a_narrow_window_sees_a_small_push_better() -> None:
@@ -90,5 +92,5 @@ def test_one_strong_edge_that_many_rooms_have_is_no_print() -> None:
         for k in range(2)
     ]
     first, second = (prepare_sight(room, 4.0, 3.0) for room in rooms)
-    assert texture(first, second, np.eye(4)) < 0.3
-    assert texture(first, first, np.eye(4)) > 0.9
+    assert correlate_views(first, second, np.eye(4)) < 0.3
+    assert correlate_views(first, first, np.eye(4)) > 0.9

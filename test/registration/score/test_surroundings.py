@@ -31,8 +31,8 @@ def test_an_object_that_moved_outvotes_the_room_and_is_outvoted_once_it_is_left_
     assert verify(before, after, with_the_slab).score > verify(before, after, with_the_room).score
     false, true = (verify_surroundings(before, after, own, T) for T in (with_the_slab, with_the_room))
     assert false is not None and true is not None and true.score > false.score + 0.5
-    assert true.texture is not None and true.texture > 0.9
-    assert false.texture is not None and false.texture < 0.3
+    assert true.correlation is not None and true.correlation > 0.9
+    assert false.correlation is not None and false.correlation < 0.3
 
 
 def test_a_small_object_outvotes_nothing_and_is_not_left_out(rooms) -> None:
@@ -61,7 +61,7 @@ def test_views_without_grey_are_asked_for_their_depth_alone(rooms) -> None:
     before, after, own = rooms
     blind = replace(before, textured=False)
     found = verify_surroundings(blind, after, own, np.eye(4))
-    assert found is not None and found.texture is None and found.inliers > 0.95
+    assert found is not None and found.correlation is None and found.inliers > 0.95
 
 
 def test_a_camera_that_is_not_that_of_its_points_breaks_nothing(rooms) -> None:

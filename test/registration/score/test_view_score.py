@@ -41,7 +41,7 @@ def test_the_true_pose_is_believed(sights) -> None:
     found = verify(*sights, TRUTH)
     assert found.score > 0.5
     assert found.violations < 0.05
-    assert found.texture is not None and found.texture > 0.5
+    assert found.correlation is not None and found.correlation > 0.5
 
 
 def test_both_ways_round_give_the_same_answer(sights) -> None:
@@ -58,7 +58,7 @@ def test_a_pose_off_by_twenty_centimetres_is_worth_less(sights, axis: int) -> No
 def test_views_that_do_not_meet_are_not_tested(sights) -> None:
     away = pose(rotation_from_vector(np.array([0.0, np.pi, 0.0])), np.zeros(3))
     found = verify(*sights, away)
-    assert found.tested == 0 and found.score == -3.0 and found.texture is None
+    assert found.tested == 0 and found.score == -3.0 and found.correlation is None
 
 
 def test_a_ragged_edge_does_not_float_and_a_thing_that_is_gone_does(sights) -> None:
@@ -129,7 +129,7 @@ def test_what_is_said_of_a_pose_is_what_the_worse_way_says_of_each(monkeypatch: 
     one, other = (SimpleNamespace(side=side, textured=False, points=range(200)) for side in (1, 2))
     for sights in ((one, other), (other, one)):
         found = verify(*sights, TRUTH)
-        assert (found.inliers, found.violations, found.occluded, found.texture) == (0.5, 0.1, 0.2, None)
+        assert (found.inliers, found.violations, found.occluded, found.correlation) == (0.5, 0.1, 0.2, None)
         assert found.tested == 400 and found.score == pytest.approx(NO_TEXTURE + 0.5 - 3.0 * 0.1 - 0.65)
 
 
