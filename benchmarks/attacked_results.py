@@ -27,7 +27,7 @@ from objreg_mapper.params import MapperParams
 from objreg_mapper.pose_graph import PoseGraph
 from objreg_ros.bridge.messages import from_msg, motion_from_msg
 from objreg_tools.cli.batch_work import BatchWork
-from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 from objreg_tools.report.batch.batch_page import batch_page
 from objreg_tools.report.batch.batch_rows import Row
@@ -46,7 +46,7 @@ def result_attempt(folder: Path) -> Attempt:
     recording = folder / "walk"
     recording.mkdir()
     (recording / "rgb.txt").write_text("")
-    work = BatchWork.of(Asked(read_settings(None, ())), folder, ("batch",))
+    work = BatchWork.of(RecordedOptions(read_settings(None, ())), folder, ("batch",))
     good = borrowed("report/batch/test_batch_schema.py").RESULT
 
     def attempt(draw: random.Random) -> None:

@@ -27,7 +27,7 @@ import pyarrow.parquet
 
 from objreg_tools.cli.batch_work import BatchWork
 from objreg_tools.cli.commands.simulate import camera_of, sensors_of
-from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 from objreg_tools.report.batch.batch_rows import Row
 from objreg_tools.report.batch.batch_tables import batch_tables
@@ -43,7 +43,7 @@ def measure(
 ) -> dict[str, Any]:
     """The figures of one run over all recordings; ``receive`` is told how many have ended."""
     settings = read_settings(None, ["registrar.threads=1", "detector.threads=1"])
-    work = BatchWork.of(Asked(settings), folder, ("batch",))
+    work = BatchWork.of(RecordedOptions(settings), folder, ("batch",))
     start, ended = time.perf_counter(), list[Done[Path, None]]()
     for done in spread(work, recordings, workers):
         done.result()

@@ -23,7 +23,7 @@ from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_tools.report.run.revisits import Revisit, Seen, recall_by_view_change, revisits
+from objreg_tools.report.run.revisits import Revisit, SeenPlace, recall_by_view_change, revisits
 from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 from objreg_tools.truth import FALSE, LOOSE, Truth, within
 
@@ -121,7 +121,9 @@ def keyframes_of(frames: Sequence[Frame]) -> list[Frame]:
 
 def loops_of(keyframes: Sequence[Frame], truth: Truth) -> list[Revisit]:
     """The revisits that there were to close, by truth."""
-    return revisits([Seen(f.stamp_ns, f.view, T) for f in keyframes if (T := truth.at(f.stamp_ns)) is not None], GAP_NS)
+    return revisits(
+        [SeenPlace(f.stamp_ns, f.view, T) for f in keyframes if (T := truth.at(f.stamp_ns)) is not None], GAP_NS
+    )
 
 
 def candidate_pairs(keyframes: Sequence[Frame], most: int) -> list[tuple[int, int]]:

@@ -74,10 +74,9 @@ class Asked:
 
 
 def code() -> str:
-    """Eight digits that change with the package and the benchmarks."""
-    files = [
-        file for folder in (Path(objreg_ros.__file__).parent, Path(__file__).parent) for file in folder.rglob("*.py")
-    ]
+    """Eight digits that change with the packages and the benchmarks."""
+    root = Path(objreg_ros.__file__).parents[1]
+    files = [file for folder in (*root.glob("objreg_*"), Path(__file__).parent) for file in folder.rglob("*.py")]
     return hashlib.sha1(b"".join(file.read_bytes() for file in sorted(files))).hexdigest()[:8]
 
 

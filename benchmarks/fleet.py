@@ -16,7 +16,7 @@ from typing import Any
 from closers import TOLERANCE_NS
 
 from objreg_ros.data.closures import LoopClosure
-from objreg_tools.report.run.revisits import VIEW_CHANGES, Revisit, Seen, revisit_of
+from objreg_tools.report.run.revisits import VIEW_CHANGES, Revisit, SeenPlace, revisit_of
 from objreg_tools.truth import FALSE, LOOSE, Truths, within
 
 APART_NS = 2_000_000_000
@@ -40,7 +40,7 @@ class Meeting:
         )
 
 
-def meetings(seen: Mapping[str, Sequence[Seen]]) -> list[Meeting]:
+def meetings(seen: Mapping[str, Sequence[SeenPlace]]) -> list[Meeting]:
     """For every keyframe of every robot one meeting with each other robot that had seen its place before.
 
     ``seen`` has the keyframes of each robot by name; their true poses are in one world, and their stamps of one clock.

@@ -103,7 +103,7 @@ def shifted(cdr: bytes, by_ns: int) -> bytes:
 
 def endless(messages: Sequence[tuple[str, int, bytes]], seconds: float) -> Iterator[Any]:
     """The messages (topic, stamp, bytes) over and over for so many seconds of their own time, as items of a player."""
-    from objreg_ros.bridge.streams.player import Item
+    from objreg_ros.bridge.streams.player import PlayedMessage
 
     first_ns, last_ns = messages[0][1], messages[-1][1]
     period_ns = last_ns - first_ns + (last_ns - first_ns) * 3 // len(messages)
@@ -112,7 +112,7 @@ def endless(messages: Sequence[tuple[str, int, bytes]], seconds: float) -> Itera
         for topic, stamp_ns, cdr in messages:
             if stamp_ns + by_ns - first_ns > seconds * 1e9:
                 return
-            yield Item(topic, stamp_ns + by_ns, shifted(cdr, by_ns))
+            yield PlayedMessage(topic, stamp_ns + by_ns, shifted(cdr, by_ns))
         by_ns += period_ns
 
 

@@ -45,7 +45,7 @@ from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-from objreg_tools.report.run.revisits import Seen
+from objreg_tools.report.run.revisits import SeenPlace
 from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 from objreg_tools.simulation.write import simulate_fleet
 from objreg_tools.truth import FALSE, Truth, Truths, within
@@ -200,7 +200,7 @@ def meetings_of(team: Team) -> list[fleet.Meeting]:
     """The meetings that there were, by the truth of frames as far apart as keyframes are."""
     seen = {
         name: [
-            Seen(frame.stamp_ns, frame.view, T)
+            SeenPlace(frame.stamp_ns, frame.view, T)
             for frame in keyframes_of(robot.frames)
             if (T := robot.truth.at(frame.stamp_ns)) is not None
         ]

@@ -53,7 +53,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_tools.report.run.revisits import Seen, overlap
+from objreg_tools.report.run.revisits import SeenPlace, overlap
 from objreg_tools.simulation.write import simulate
 from objreg_tools.truth import FALSE, LOOSE, Truth, within
 
@@ -138,7 +138,7 @@ def right_of(keyframes: Sequence[Keyframe], truth: Truth, params: RegistrarParam
     known = [k for k, T in enumerate(poses) if T is not None]
     right = np.zeros((len(keyframes), len(keyframes)), bool)
     truths = Truths([keyframes[k] for k in known], [poses[k] for k in known], params)  # type: ignore[misc]
-    seen = [Seen(keyframes[k].stamp_ns, keyframes[k].view, poses[k]) for k in known]  # type: ignore[arg-type]
+    seen = [SeenPlace(keyframes[k].stamp_ns, keyframes[k].view, poses[k]) for k in known]  # type: ignore[arg-type]
     for j, i in combinations(range(len(known)), 2):
         pair = truths.pair(i, j)
         if pair is not None and pair.could_close:

@@ -25,7 +25,7 @@ from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose_error
 from objreg_ros.plausibility.finding import Finding
-from objreg_tools.cli.recorded import Asked, Opened
+from objreg_tools.cli.recorded import Opened, RecordedOptions
 from objreg_tools.recording.inputs import choose_inputs
 from objreg_tools.recording.mounts import first_frames
 from objreg_tools.recording.troubles import troubles
@@ -81,10 +81,10 @@ def detector_of(model: str, threshold: float) -> Remembering:
     return Remembering(Detector.of(DetectorParams(model=model, threshold=threshold, threads=1), share.model))
 
 
-def asked_of(model: str, threshold: float) -> Asked:
+def asked_of(model: str, threshold: float) -> RecordedOptions:
     """The settings: all of them as they are by default, but for the model and for one thread each."""
     changes = (f"detector.threshold={threshold}", "detector.threads=1", "registrar.threads=1")
-    return Asked.of(model, None, "", None, changes, (), None, None)
+    return RecordedOptions.of(model, None, "", None, changes, (), None, None)
 
 
 def run_case(case: Case) -> Row:

@@ -21,9 +21,9 @@ from objreg_mapper.map_files import graph_file, require_ours
 from objreg_mapper.optimisation.incremental import load
 from objreg_mapper.optimisation.problem import Problem, Solution
 from objreg_mapper.params import MapperNodeParams, MapperParams
-from objreg_mapper.pose_graph import PoseGraph, Summary
+from objreg_mapper.pose_graph import MapSummary, PoseGraph
 from objreg_mapper.restart import Anew
-from objreg_mapper.waiting import Waiting
+from objreg_mapper.waiting import ClosureQueue
 from objreg_ros.bridge.camera.transforms import receive_mount
 from objreg_ros.bridge.messages import motion_from_msg
 from objreg_ros.bridge.node import qos
@@ -65,7 +65,7 @@ class MapperNode(NodeBase):
         self._shared_frames = set[str]()  # of which the log has warned
         self._followers = Followers()
         mount = receive_mount(self, self._inputs.mounting)
-        self._waiting = Waiting(self._followers, mount.T_body_camera, qos.KEPT_CONSTRAINTS)
+        self._waiting = ClosureQueue(self._followers, mount.T_body_camera, qos.KEPT_CONSTRAINTS)
         self._begin(self._resumed())
         prefixes = prefixes_of(self, self._inputs.robots)
         self._out = MapAnnouncements(self, self._inputs.map_frame, prefixes)
@@ -89,7 +89,7 @@ class MapperNode(NodeBase):
 
     def _begin(self, graph: PoseGraph | None = None) -> None:
         self._graph = graph or PoseGraph(self.settings.of(MapperParams))
-        self._summary = Summary() if graph is None else graph.optimise()
+        self._summary = MapSummary() if graph is None else graph.optimise()
 
     def _start_anew(self, reason: str) -> None:
         """An empty map; the closures that wait are of keyframes of the old one, and are dropped."""

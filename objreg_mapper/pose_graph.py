@@ -30,7 +30,7 @@ VAGUEST = 1e12  # m^2 and rad^2: ROS says "unknown" by less; what is known no be
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class MapSummary:
     """What an optimisation came to: the closures that it kept, and those that it pruned, and with what ``residuals``.
 
     These are of the pruned ones, in standard deviations. ``strain`` is how far those that are kept are from odometry.
@@ -186,7 +186,7 @@ class PoseGraph:
 
     # Solving
 
-    def optimise(self) -> Summary:
+    def optimise(self) -> MapSummary:
         """Solve and adopt in one go."""
         problem = self.problem()
         return self.adopt(problem, problem.solve())
@@ -213,7 +213,7 @@ class PoseGraph:
             doubted |= self._pairwise.contradicted(self._closures, self.sessions, self.params.picture_sigmas)
         return doubted - self._withdrawn
 
-    def adopt(self, problem: Problem, solution: Solution) -> Summary:
+    def adopt(self, problem: Problem, solution: Solution) -> MapSummary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""
         self._solution = solution
         self._T_map_odom = {
@@ -224,7 +224,7 @@ class PoseGraph:
             closure = self._closures[k].closure
             if closure is not None and k not in problem.withdrawn and not np.isnan(residual):
                 (kept if is_kept else pruned).append((closure, float(residual)))
-        return Summary(
+        return MapSummary(
             tuple(row[0] for row in kept),
             tuple(row[0] for row in pruned),
             tuple(row[1] for row in pruned),

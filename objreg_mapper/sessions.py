@@ -10,7 +10,7 @@ from objreg_mapper.session import Session
 from objreg_ros.data.closures import LoopClosure
 
 
-class Moment(NamedTuple):
+class StampedFrame(NamedTuple):
     """An end of a closure: ``robot`` is empty and ``session`` None where they are not given."""
 
     robot: str
@@ -18,11 +18,11 @@ class Moment(NamedTuple):
     stamp_ns: int
 
 
-def moments_of(closure: LoopClosure) -> tuple[Moment, Moment]:
+def moments_of(closure: LoopClosure) -> tuple[StampedFrame, StampedFrame]:
     """Those of *from* and of *to*."""
     return (
-        Moment(closure.from_robot, closure.from_session, closure.from_ns),
-        Moment(closure.to_robot, closure.to_session, closure.to_ns),
+        StampedFrame(closure.from_robot, closure.from_session, closure.from_ns),
+        StampedFrame(closure.to_robot, closure.to_session, closure.to_ns),
     )
 
 
@@ -57,7 +57,7 @@ class Sessions(list[Session]):
         """The session in which the odometry of a robot goes on; None before it begins."""
         return next((k for k in reversed(range(len(self))) if self[k].robot == robot and not self[k].is_over), None)
 
-    def of(self, moment: Moment) -> int | None:
+    def of(self, moment: StampedFrame) -> int | None:
         """The session that has a moment: the one that does, and of several the one of this name.
 
         None where none has it yet. ValueError where two may, and nothing says which is meant.
@@ -79,26 +79,26 @@ class Sessions(list[Session]):
             )
         return None
 
-    def in_gap(self, moment: Moment) -> bool:
+    def in_gap(self, moment: StampedFrame) -> bool:
         """Whether a moment lies in a gap of the odometry that goes on, so that no session will ever have it."""
         on = self._going_on(moment.robot)
         return self._is_lost(moment) and any(self[k].odometry.in_gap(moment.stamp_ns) for k in on)
 
-    def is_before_odometry(self, moment: Moment) -> bool:
+    def is_before_odometry(self, moment: StampedFrame) -> bool:
         """Whether odometry began after a moment that no session has: it will never be covered."""
         return self._is_lost(moment) and not self.in_gap(moment)
 
-    def _is_lost(self, moment: Moment) -> bool:
+    def _is_lost(self, moment: StampedFrame) -> bool:
         on = [self[k].odometry for k in self._going_on(moment.robot)]
         past = all(one.in_gap(moment.stamp_ns) or (one.stamps_ns and moment.stamp_ns < one.stamps_ns[0]) for one in on)
         return bool(on) and past and not self._covering(moment)
 
-    def _may_come(self, moment: Moment) -> bool:
+    def _may_come(self, moment: StampedFrame) -> bool:
         """Whether odometry that goes on, or is about to, has yet to come to a moment."""
         on = self._going_on(moment.robot)
         return not on or any(self[k].is_ahead(moment.stamp_ns) for k in on)
 
-    def _covering(self, moment: Moment) -> list[int]:
+    def _covering(self, moment: StampedFrame) -> list[int]:
         return [k for k in self._those_of(moment.robot) if self[k].covers(moment.stamp_ns)]
 
     def _going_on(self, robot: str) -> list[int]:

@@ -24,7 +24,7 @@ class Fate(NamedTuple):
     text: str = ""
 
 
-class Waiting:
+class ClosureQueue:
     """At most ``most`` closures that wait for odometry, the oldest first. Odometry may come before or after them."""
 
     def __init__(self, followers: Followers, find_mount: FindMount, most: int) -> None:

@@ -9,10 +9,10 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_ros.data.images import Detections
 from objreg_ros.detector.contract import Candidates
-from objreg_ros.detector.picture import Place
+from objreg_ros.detector.picture import Placement
 
 
-def draw_masks(found: Detections, candidates: Candidates, rows: Array, place: Place) -> Array | None:
+def draw_masks(found: Detections, candidates: Candidates, rows: Array, place: Placement) -> Array | None:
     """The ``instances`` of what was found in these rows of the candidates; None where the model gives no masks.
 
     A mask is where the sum is above 0, a sigmoid of more than a half, cut to its box. Of two that overlap the better
@@ -28,7 +28,7 @@ def draw_masks(found: Detections, candidates: Candidates, rows: Array, place: Pl
     return numbers
 
 
-def _seen(logits: Array, box: tuple[slice, slice], place: Place) -> Array:
+def _seen(logits: Array, box: tuple[slice, slice], place: Placement) -> Array:
     """Values ``(h, w)`` over the model's picture as the pixels of a box of the camera's see them, linear between."""
     scale, first = np.ones(2), np.zeros(2)  # of y and x: the value that is at a pixel is at scale * pixel + first
     for axis, (size, inner, before) in enumerate(((0, place.height, place.top), (1, place.width, place.left))):

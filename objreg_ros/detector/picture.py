@@ -45,7 +45,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Place:
+class Placement:
     """Where a camera's picture of ``hw`` lies in a model's of ``model_hw``: top, left, height and width there."""
 
     hw: tuple[int, int]
@@ -56,7 +56,7 @@ class Place:
     width: int
 
     @classmethod
-    def of(cls, hw: tuple[int, int], model_hw: tuple[int, int], fit: str) -> Place:
+    def of(cls, hw: tuple[int, int], model_hw: tuple[int, int], fit: str) -> Placement:
         """The place that ``fit`` gives it."""
         if fit == "stretched":
             return cls(hw, model_hw, 0, 0, *model_hw)
@@ -118,10 +118,10 @@ class Picture:
         height, width = read_imgsz(metadata) or own
         return self.height or height, self.width or width
 
-    def place(self, rgb: Array) -> Place:
+    def place(self, rgb: Array) -> Placement:
         """Where ``rgb (H, W, 3)`` lies in the model's picture."""
         height, width = rgb.shape[:2]
-        return Place.of((height, width), (self.height or height, self.width or width), self.look.fit)
+        return Placement.of((height, width), (self.height or height, self.width or width), self.look.fit)
 
     def tensor(self, rgb: Array) -> Array:
         """The input tensor for ``rgb (H, W, 3) uint8``."""

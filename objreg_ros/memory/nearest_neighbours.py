@@ -29,19 +29,19 @@ ROUNDING = 1e-5  # relative: what single precision may lose in a comparison, wit
 NO_SESSION = -1  # of what our own tracking says where it is: nothing is left out for it
 
 
-class Sessions(NamedTuple):
+class SessionFilter(NamedTuple):
     """Those of the robot that asks, and those that are left out: (S,) int64 each, sorted."""
 
     own: Array
     hidden: Array
 
     @classmethod
-    def of(cls, own: Collection[int], hidden: Collection[int]) -> Sessions:
+    def of(cls, own: Collection[int], hidden: Collection[int]) -> SessionFilter:
         """Of the numbers of sessions."""
         return cls(*(np.array(sorted(numbers), np.int64) for numbers in (own, hidden)))
 
 
-NO_SESSIONS = Sessions.of((), ())
+NO_SESSIONS = SessionFilter.of((), ())
 
 
 class Block:
@@ -87,7 +87,7 @@ class Block:
         self._free.append(i)
 
     def nearest(
-        self, sighting: Sighting, params: MemoryParams, most: int, margin: float, sessions: Sessions = NO_SESSIONS
+        self, sighting: Sighting, params: MemoryParams, most: int, margin: float, sessions: SessionFilter = NO_SESSIONS
     ) -> tuple[Array, Array]:
         """The rows (at most ``most``) that look most like this one, and half their squared distances, (K,) each.
 

@@ -21,7 +21,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.memory.nearest_neighbours import Block, Sessions
+from objreg_ros.memory.nearest_neighbours import Block, SessionFilter
 from objreg_ros.memory.params import MemoryParams
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.labels import LabelGroups
@@ -100,7 +100,7 @@ class Index:
 
         May be empty. There are more than ``candidates``, so that those which turn out to be redundant have successors.
         """
-        sessions = Sessions.of(self._sessions.get(sightings[0].robot, ()), hidden)
+        sessions = SessionFilter.of(self._sessions.get(sightings[0].robot, ()), hidden)
         ballots = [self._ballot(sighting, len(self), sessions) for sighting in sightings]
         where, when, votes = (np.concatenate(column) for column in zip(*ballots, strict=True))
         ballot = np.repeat(np.arange(len(ballots)), [len(ballot[-1]) for ballot in ballots])
@@ -113,7 +113,7 @@ class Index:
         chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
         return [CandidateKeyframe(number, session, stamp_ns, vote) for (stamp_ns, session, number, _), vote in chosen]
 
-    def _ballot(self, sighting: Sighting, stored: int, sessions: Sessions) -> tuple[Array, Array, Array]:
+    def _ballot(self, sighting: Sighting, stored: int, sessions: SessionFilter) -> tuple[Array, Array, Array]:
         """Where and when the objects were seen that look most like this one, the nearest first, and their votes."""
         block = self._blocks.get(self._groups.of(sighting.label), EMPTY)
         rows, halves = block.nearest(sighting, self.params, SHORTLIST, VOTE_CUTOFF, sessions)

@@ -11,8 +11,8 @@ from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.closure import Accepted, Waiting, redundant, rejected, waiting_of
-from objreg_ros.registrar.confirmation import Confirmation, Held
+from objreg_ros.registrar.closure import Decision, WaitingClosure, redundant, rejected, waiting_of
+from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
@@ -42,7 +42,7 @@ class CameraTrack:
         self.confirmation = Confirmation(params)
         self.thinning = Thinning(params.thin_seconds)
         self.proven = True  # whether enough of the camera was seen to believe it
-        self.unproven: list[Waiting] = []  # accepted while it was not
+        self.unproven: list[WaitingClosure] = []  # accepted while it was not
         self.hidden: frozenset[int] = frozenset()
         self.clock: Clock | None = None
         self.sessions: set[int] = set()  # of the run of the clock
@@ -71,15 +71,16 @@ class CameraTrack:
         unproven, self.unproven = [waiting.refused(refusal or waiting.refusal) for waiting in self.unproven], []
         return (*unproven, *self.confirmation.give_up(refusal))
 
-    def hold(self, held: Held, keyframe: Keyframe, named: Sequence[Sighting]) -> None:
+    def hold(self, decision: Decision, keyframe: Keyframe, named: Sequence[Sighting]) -> None:
         """Keep a pose that waits for other keyframes; ``named`` are the keyframe's sightings."""
-        number, item, refusal = held
-        self.confirmation.hold(number, waiting_of(keyframe, named, item, refusal, self._params))
+        assert decision.refusal is not None and decision.waits_as is not None
+        waiting = waiting_of(keyframe, named, decision, decision.refusal, self._params)
+        self.confirmation.hold(decision.waits_as, waiting)
 
-    def wait_for_proof(self, accepted: Sequence[Accepted], keyframe: Keyframe, named: Sequence[Sighting]) -> None:
+    def wait_for_proof(self, accepted: Sequence[Decision], keyframe: Keyframe, named: Sequence[Sighting]) -> None:
         """Keep what was accepted until the camera is believed; ``named`` are the keyframe's sightings."""
         params = self._params
-        self.unproven += [waiting_of(keyframe, named, item, UNPROVEN, params) for item in accepted]
+        self.unproven += [waiting_of(keyframe, named, one, UNPROVEN, params) for one in accepted]
 
     def release(self, recollection: Recollection, doubt: str) -> Outcome:
         """Believe the camera, or refuse all that waits where it is in ``doubt``."""
@@ -109,7 +110,7 @@ class CameraTrack:
                 self.unproven.append(waiting)
         return Outcome(closures=tuple(closures), rejected=tuple(refused))
 
-    def _late(self, waiting: Waiting, recollection: Recollection) -> LoopClosure:
+    def _late(self, waiting: WaitingClosure, recollection: Recollection) -> LoopClosure:
         """A constraint that waited, written down."""
         settled, ends = recollection.remember_late(waiting)
         if ends is not None:

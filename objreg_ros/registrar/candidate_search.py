@@ -15,8 +15,8 @@ from typing import NamedTuple
 from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.store import Store, StoreError
-from objreg_ros.registrar.closure import Accepted, redundant, rejected
-from objreg_ros.registrar.confirmation import Confirmation, Held, Tried
+from objreg_ros.registrar.closure import Decision, redundant, rejected
+from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration import align
@@ -71,13 +71,13 @@ class Means(NamedTuple):
 class Found(NamedTuple):
     """What the candidates of one keyframe came to, in the order in which they were tried."""
 
-    accepted: list[Accepted]
-    held: list[Held]
+    accepted: list[Decision]
+    waiting: list[Decision]
     refused: list[Rejected]
 
 
-_Try = tuple[CandidateKeyframe, Callable[[], Tried | Rejected] | None]
-"""A candidate keyframe that is being tried, and what waits for its registration."""
+_Try = tuple[CandidateKeyframe, Callable[[], Decision | Rejected] | None]
+"""A candidate keyframe that is being tried, and what waits for the decision on it."""
 
 
 class Search:
@@ -103,15 +103,14 @@ class Search:
                 found.refused.append(self._redundant(stored))
                 continue
             tries -= 1
-            tried = ask()
-            verdict = self._means.confirmation.receive(tried) if isinstance(tried, Tried) else tried
-            if isinstance(verdict, Accepted):
+            decision = ask()
+            if isinstance(decision, Rejected):
+                found.refused.append(decision)
+            elif decision.accepted:
                 self._thinning.accept(stored.session, stored.stamp_ns, self._keyframe.stamp_ns)
-                found.accepted.append(verdict)
-            elif isinstance(verdict, Held):
-                found.held.append(verdict)
+                found.accepted.append(decision)
             else:
-                found.refused.append(verdict)
+                found.waiting.append(decision)
         return found
 
     def _is_redundant(self, stored: CandidateKeyframe) -> bool:
@@ -135,7 +134,7 @@ class Search:
             self._trying.append((stored, None if redundant else self._try_candidate(stored)))
             busy += not redundant
 
-    def _try_candidate(self, stored: CandidateKeyframe) -> Callable[[], Tried | Rejected]:
+    def _try_candidate(self, stored: CandidateKeyframe) -> Callable[[], Decision | Rejected]:
         """Begin to register a candidate keyframe in a thread of its own; what comes back waits for the end of it."""
         keyframe, over = self._keyframe, self._budget.over()
         if over:
@@ -150,4 +149,4 @@ class Search:
         method.prepare(keyframe)
         prior = expect(keyframe, target, self._params)
         registered = pool.submit(align, keyframe, target, prior, self._params, method, gate)
-        return lambda: Tried(keyframe, target, prior, registered.result())
+        return lambda: self._means.confirmation.receive(keyframe, target, prior, registered.result())

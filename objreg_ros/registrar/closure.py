@@ -24,16 +24,28 @@ from objreg_ros.registration.result import evidence_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Accepted:
-    """A stored keyframe and the pose of a new one in it, with what others say of it where that was asked."""
+class Decision:
+    """A pose of a new keyframe in a stored one, ``target``, and what becomes of it.
+
+    It is accepted where ``refusal`` is None. Else it waits for other keyframes by the number of its statement,
+    ``waits_as``, and is refused for that where they do not confirm it. ``support`` is what others say of it, where that
+    was asked.
+    """
 
     target: Keyframe
     candidate: Candidate
     support: Support | None = None
+    refusal: Refusal | None = None
+    waits_as: int | None = None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it is published now."""
+        return self.refusal is None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Waiting:
+class WaitingClosure:
     """A constraint that waits for others to confirm it; ``accepted`` by the gate, and others disagree.
 
     ``refusal`` is what becomes of it if none do. ``pairs`` are the instances of each matched object in the keyframes
@@ -55,12 +67,12 @@ class Waiting:
         assert session is not None
         return session
 
-    def confirmed(self, support: Support) -> Waiting:
+    def confirmed(self, support: Support) -> WaitingClosure:
         """The same with what others say of it as evidence."""
         evidence = self.closure.evidence | support_evidence(support)
         return replace(self, closure=replace(self.closure, evidence=evidence))
 
-    def renamed(self, landmarks: Mapping[int, int]) -> Waiting:
+    def renamed(self, landmarks: Mapping[int, int]) -> WaitingClosure:
         """The same under the ids that its objects have by now, by their instance in the later keyframe."""
         matches = tuple(
             replace(match, object_id=landmarks.get(here, match.object_id))
@@ -111,45 +123,45 @@ def redundant(seconds: float) -> Refusal:
 
 
 def closure_of(
-    keyframe: Keyframe, sightings: Sequence[Sighting], item: Accepted, params: RegistrarParams
+    keyframe: Keyframe, sightings: Sequence[Sighting], decision: Decision, params: RegistrarParams
 ) -> LoopClosure:
     """The constraint of an accepted candidate; ``sightings`` are the keyframe's, with their landmarks."""
-    candidate = item.candidate
+    candidate = decision.candidate
     matches = tuple(
         ObjectMatch(label=pair.label, object_id=sightings[pair.source].landmark) for pair in candidate.matched
     )
     return LoopClosure(
-        from_ns=item.target.stamp_ns,
+        from_ns=decision.target.stamp_ns,
         to_ns=keyframe.stamp_ns,
         T_from_to=candidate.T_target_source,
         covariance=covariance_of(candidate, params),
         labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
         objects=matches,
-        evidence=evidence_of(candidate) | _moved(keyframe, item) | support_evidence(item.support),
-        from_frame_id=item.target.frame_id,
+        evidence=evidence_of(candidate) | _moved(keyframe, decision) | support_evidence(decision.support),
+        from_frame_id=decision.target.frame_id,
         to_frame_id=keyframe.frame_id,
-        from_session=item.target.session,
+        from_session=decision.target.session,
         to_session=keyframe.session,
-        from_robot=item.target.robot,
+        from_robot=decision.target.robot,
         to_robot=keyframe.robot,
     )
 
 
 def waiting_of(
-    keyframe: Keyframe, sightings: Sequence[Sighting], item: Accepted, refusal: Refusal, params: RegistrarParams
-) -> Waiting:
+    keyframe: Keyframe, sightings: Sequence[Sighting], decision: Decision, refusal: Refusal, params: RegistrarParams
+) -> WaitingClosure:
     """What is kept of a pose that waits: no clouds. ``sightings`` as for `closure_of`."""
-    here, there = keyframe.objects, item.target.objects
-    return Waiting(
-        closure=closure_of(keyframe, sightings, item, params),
+    here, there = keyframe.objects, decision.target.objects
+    return WaitingClosure(
+        closure=closure_of(keyframe, sightings, decision, params),
         refusal=refusal,
         accepted=refusal[0] is Reason.NEIGHBOURS,
         source_id=keyframe.keyframe_id,
-        target_id=item.target.keyframe_id,
+        target_id=decision.target.keyframe_id,
         pairs=tuple(
-            (here[pair.source].cloud.instance, there[pair.target].cloud.instance) for pair in item.candidate.matched
+            (here[pair.source].cloud.instance, there[pair.target].cloud.instance) for pair in decision.candidate.matched
         ),
-        R_there_here=_turn(keyframe, item),
+        R_there_here=_turn(keyframe, decision),
     )
 
 
@@ -166,33 +178,33 @@ def observations(keyframe: Keyframe, sightings: Sequence[Sighting]) -> tuple[Obs
     )
 
 
-def links_of(keyframe: Keyframe, item: Accepted, stored: Sequence[Sighting]) -> list[Link]:
+def links_of(keyframe: Keyframe, decision: Decision, stored: Sequence[Sighting]) -> list[Link]:
     """Which objects of a keyframe are which ``stored`` ones of the target, by the accepted pose."""
     of = {sighting.instance: sighting for sighting in stored}
-    R_there_here = _turn(keyframe, item)
+    R_there_here = _turn(keyframe, decision)
     return [
-        Link(index=pair.source, of=of[item.target.objects[pair.target].cloud.instance], R_there_here=R_there_here)
-        for pair in item.candidate.matched
+        Link(index=pair.source, of=of[decision.target.objects[pair.target].cloud.instance], R_there_here=R_there_here)
+        for pair in decision.candidate.matched
     ]
 
 
-def _moved(keyframe: Keyframe, item: Accepted) -> dict[str, float]:
+def _moved(keyframe: Keyframe, decision: Decision) -> dict[str, float]:
     """How far the objects went that stand elsewhere now, under `MOVED`'s names; the farthest of several of one.
 
     Two without a name may or may not be the same.
     """
     found: dict[str, float] = {}
-    for pair in (pair for pair in item.candidate.moved if pair.label != UNNAMED):
-        here = transform(item.candidate.T_target_source, keyframe.objects[pair.source].centroid)
-        metres = float(np.linalg.norm(here - item.target.objects[pair.target].centroid))
+    for pair in (pair for pair in decision.candidate.moved if pair.label != UNNAMED):
+        here = transform(decision.candidate.T_target_source, keyframe.objects[pair.source].centroid)
+        metres = float(np.linalg.norm(here - decision.target.objects[pair.target].centroid))
         name = f"moved {pair.label} [m]"
         found[name] = max(metres, found.get(name, 0.0))
     return found
 
 
-def _turn(keyframe: Keyframe, item: Accepted) -> Array:
+def _turn(keyframe: Keyframe, decision: Decision) -> Array:
     """(3, 3) from the axes of the keyframe's session into those of the target's."""
-    return _rotation(item.target) @ item.candidate.T_target_source[:3, :3] @ _rotation(keyframe).T
+    return _rotation(decision.target) @ decision.candidate.T_target_source[:3, :3] @ _rotation(keyframe).T
 
 
 def _rotation(keyframe: Keyframe) -> Array:

@@ -9,12 +9,11 @@ waits as well. What waits longer than ``confirm_seconds``, or beyond the reach o
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from objreg_ros.data.closures import Reason, Rejected
-from objreg_ros.registrar.closure import Accepted, Waiting, rejected
+from objreg_ros.registrar.closure import Decision, WaitingClosure, rejected
 from objreg_ros.registrar.consistency import Consistency, Standpoint, Statement, Support
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate
@@ -35,23 +34,6 @@ OPPOSED_SHARE = 0.5  # what the gate accepts waits below
 COUNTS = 1.0  # what weighs less opposes nothing: one that is certain
 
 
-class Tried(NamedTuple):
-    """A pair of keyframes, what odometry expected of it, and what its registration came to."""
-
-    source: Keyframe
-    target: Keyframe
-    prior: Prior | None
-    registration: Registration
-
-
-class Held(NamedTuple):
-    """A pose that waits, by the number of its statement, and why it is not published."""
-
-    number: int
-    item: Accepted
-    refusal: Refusal
-
-
 class Confirmation:
     """Receives of every pair that was tried, and says which poses others confirm.
 
@@ -62,35 +44,42 @@ class Confirmation:
     def __init__(self, params: RegistrarParams) -> None:
         self._limits, self._wait_ns = limits_of(params), round(1e9 * params.confirm_seconds)
         self._consistency = Consistency()
-        self._waiting: dict[int, Waiting] = {}
+        self._waiting: dict[int, WaitingClosure] = {}
 
     def __len__(self) -> int:
         """How many wait."""
         return len(self._waiting)
 
-    def receive(self, tried: Tried) -> Accepted | Held | Rejected:
-        """What a registration comes to beside what was received before; ValueError where a gate gave no reason."""
-        registration = tried.registration
-        candidate, accepted = registration.candidate, registration.accepted
-        if candidate is None or not (accepted or (self._wait_ns and self._possible(candidate, tried.prior))):
-            return _refused(tried)
-        item = Accepted(target=tried.target, candidate=candidate)
-        if not self._wait_ns:
-            return item
-        number = self._consistency.add(_statement(tried, candidate))
-        support = self._consistency.support(number)
-        if accepted:
-            waits = _by_odometry(tried) and _opposed(support)
-            return Held(number, item, _opposition(support)) if waits else item
-        if odds_of(candidate) < LEAST_ODDS:
-            return _refused(tried)
-        return replace(item, support=support) if _confirmed(support) else Held(number, item, _refusal(tried))
+    def receive(
+        self, source: Keyframe, target: Keyframe, prior: Prior | None, registration: Registration
+    ) -> Decision | Rejected:
+        """What the registration of a pair comes to beside what was received before.
 
-    def hold(self, number: int, waiting: Waiting) -> None:
+        ``prior`` is what odometry expected of it. ValueError where a gate gave no reason.
+        """
+        candidate, accepted = registration.candidate, registration.accepted
+        if candidate is None or not (accepted or (self._wait_ns and self._possible(candidate, prior))):
+            return _refused(source, target, registration)
+        decision = Decision(target=target, candidate=candidate)
+        if not self._wait_ns:
+            return decision
+        by_odometry = source.by_odometry and target.by_odometry
+        number = self._consistency.add(_statement(source, target, candidate, accepted, by_odometry))
+        support = self._consistency.support(number)
+        if accepted:  # where our own tracking slipped, right poses contradict each other
+            waits = by_odometry and _opposed(support)
+            return replace(decision, refusal=_opposition(support), waits_as=number) if waits else decision
+        if odds_of(candidate) < LEAST_ODDS:
+            return _refused(source, target, registration)
+        if _confirmed(support):
+            return replace(decision, support=support)
+        return replace(decision, refusal=_refusal(registration), waits_as=number)
+
+    def hold(self, number: int, waiting: WaitingClosure) -> None:
         """Let a held pose wait, with what its constraint needs once the keyframes are gone."""
         self._waiting[number] = waiting
 
-    def settle(self, now_ns: int | None) -> tuple[list[Waiting], list[Rejected]]:
+    def settle(self, now_ns: int | None) -> tuple[list[WaitingClosure], list[Rejected]]:
         """What waits no more at the end of a keyframe: what is confirmed, and what is refused for good.
 
         All of it where ``now_ns`` is None.
@@ -119,7 +108,7 @@ class Confirmation:
         held = margin is None or margin >= LEAST_MARGIN
         return held and check_possible(candidate, prior, self._limits) is None
 
-    def _settled(self, waiting: Waiting, support: Support) -> bool:
+    def _settled(self, waiting: WaitingClosure, support: Support) -> bool:
         """Whether it is published after all."""
         return not _opposed(support) if waiting.accepted else _confirmed(support)
 
@@ -132,37 +121,34 @@ def _opposed(support: Support) -> bool:
     return support.received >= COUNTS and support.share < OPPOSED_SHARE
 
 
-def _by_odometry(tried: Tried) -> bool:
-    """Whether odometry gave both poses: where our own tracking slipped, right poses contradict each other."""
-    return tried.source.by_odometry and tried.target.by_odometry
-
-
-def _statement(tried: Tried, candidate: Candidate) -> Statement:
+def _statement(
+    source: Keyframe, target: Keyframe, candidate: Candidate, accepted: bool, by_odometry: bool
+) -> Statement:
     variances = np.diag(spread_of(candidate.alignment))
     return Statement(
-        Standpoint.of(tried.source),
-        Standpoint.of(tried.target),
+        Standpoint.of(source),
+        Standpoint.of(target),
         candidate.T_target_source,
         odds_of(candidate),
-        tried.registration.accepted,
-        _by_odometry(tried),
+        accepted,
+        by_odometry,
         rotation_deg=float(np.degrees(np.sqrt(variances[3:].sum()))),
         translation_m=float(np.sqrt(variances[:3].sum())),
     )
 
 
-def _refusal(tried: Tried) -> Refusal:
+def _refusal(registration: Registration) -> Refusal:
     """Why the gate refused; ValueError where it gave no reason."""
-    if tried.registration.reason is None:
+    if registration.reason is None:
         raise ValueError("gate: expected a reason with each refusal, got None")
-    return tried.registration.reason, tried.registration.detail
+    return registration.reason, registration.detail
 
 
-def _refused(tried: Tried) -> Rejected:
-    best, target = tried.registration.candidate, tried.target
+def _refused(source: Keyframe, target: Keyframe, registration: Registration) -> Rejected:
+    best = registration.candidate
     pose = None if best is None else best.T_target_source
-    refused = rejected(target.stamp_ns, tried.source, _refusal(tried), target)
-    return replace(refused, T_from_to=pose, evidence=tried.registration.evidence)
+    refused = rejected(target.stamp_ns, source, _refusal(registration), target)
+    return replace(refused, T_from_to=pose, evidence=registration.evidence)
 
 
 def _opposition(support: Support) -> Refusal:

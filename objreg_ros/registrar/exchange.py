@@ -27,7 +27,7 @@ from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.peers.known import Peers
-from objreg_ros.registrar.peers.pending import Asked, Pending
+from objreg_ros.registrar.peers.pending import KeyframeRequest, Pending
 from objreg_ros.registrar.peers.wishes import Wishes
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.summary import (
@@ -135,7 +135,7 @@ class Exchange:
             if not ours:
                 self.counters["dropped: unlike"] += 1
                 return None
-            if not self._pending.add(Asked(summary, ours, now)):
+            if not self._pending.add(KeyframeRequest(summary, ours, now)):
                 return None
             return self._sent("requests", pack_request(Request(summary.name, ours[0].votes, self.run)))
 
@@ -197,7 +197,7 @@ class Exchange:
         keyframe = replace(came, robot=first.robot, session=session, frame_id=asked.summary.frame_id)
         return self._named(self._registrar.compare(keyframe, clock, asked.candidates, seconds, hurried))
 
-    def _answered(self, name: Name, came: Keyframe) -> Asked:
+    def _answered(self, name: Name, came: Keyframe) -> KeyframeRequest:
         """What a keyframe is the answer to; ValueError where it is not that of a summary."""
         with self._lock:
             asked = self._pending.find(name, came.stamp_ns, came.session, came.frame_id)

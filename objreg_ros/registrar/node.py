@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import NamedTuple
 
-from objreg_ros.bridge.messages.markers import Scene
+from objreg_ros.bridge.messages.markers import MarkerScene
 from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
@@ -84,7 +84,7 @@ class RegistrarNode(FramesNode):
 
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._announcing = threading.Lock(), threading.Lock()
-        self._unsearched, self._scene = 0, Scene()
+        self._unsearched, self._scene = 0, MarkerScene()
         self._may_reset = self.settings.of(PeerParams).allow_remote_reset
         self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
         self._counts = dict(self._registrar.counts())

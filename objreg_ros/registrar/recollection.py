@@ -13,7 +13,7 @@ from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
-from objreg_ros.registrar.closure import Accepted, Waiting, closure_of, links_of
+from objreg_ros.registrar.closure import Decision, WaitingClosure, closure_of, links_of
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import Keyframe
 
@@ -37,13 +37,15 @@ class Recollection:
         self._params = self.index.params = params
 
     def remember(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[Accepted]
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[Decision]
     ) -> tuple[tuple[LoopClosure, ...], tuple[Sighting, ...]]:
         """Give objects their landmarks and write all down; the closures, and the sightings with their landmarks."""
-        stored = [list(self.store.sightings(item.target.keyframe_id)) for item in accepted]
-        links = [link for item, seen in zip(accepted, stored, strict=True) for link in links_of(keyframe, item, seen)]
+        stored = [list(self.store.sightings(decision.target.keyframe_id)) for decision in accepted]
+        links = [
+            link for decision, seen in zip(accepted, stored, strict=True) for link in links_of(keyframe, decision, seen)
+        ]
         named, merged = self.landmarks.assign(sightings, links)
-        closures = tuple(closure_of(keyframe, named, item, self.params) for item in accepted)
+        closures = tuple(closure_of(keyframe, named, decision, self.params) for decision in accepted)
         self.store.add(keyframe, named, closures, merged)
         self.landmarks.add(named, merged)
         self.index.add(named)
@@ -52,22 +54,24 @@ class Recollection:
             self._forget_surplus(named)
         return closures, named
 
-    def remember_closures(self, keyframe: Keyframe, accepted: Sequence[Accepted]) -> tuple[LoopClosure, ...]:
+    def remember_closures(self, keyframe: Keyframe, accepted: Sequence[Decision]) -> tuple[LoopClosure, ...]:
         """Write the closures to a keyframe that others store down. They hold without that, too.
 
         What the keyframe shows joins no landmarks of this store.
         """
-        closures = tuple(closure_of(keyframe, self.as_known(keyframe, item), item, self.params) for item in accepted)
+        closures = tuple(
+            closure_of(keyframe, self.as_known(keyframe, decision), decision, self.params) for decision in accepted
+        )
         with suppress(StoreError):
             for closure in closures:
                 self.store.add_closure(closure, {})
         self._meet(keyframe, accepted)
         return closures
 
-    def as_known(self, keyframe: Keyframe, item: Accepted) -> tuple[Sighting, ...]:
+    def as_known(self, keyframe: Keyframe, decision: Decision) -> tuple[Sighting, ...]:
         """The objects of a keyframe that others store, with the landmarks of the stored ones that they are; else 0."""
         named = list(sightings_of(keyframe))
-        for link in links_of(keyframe, item, list(self.store.sightings(item.target.keyframe_id))):
+        for link in links_of(keyframe, decision, list(self.store.sightings(decision.target.keyframe_id))):
             named[link.index] = named[link.index].of_landmark(link.of.landmark, np.eye(3))
         return tuple(named)
 
@@ -79,7 +83,7 @@ class Recollection:
             return []
         return [(one.from_session, one.from_ns, one.to_ns) for one in ties if one.from_session is not None]
 
-    def remember_late(self, waiting: Waiting) -> tuple[Waiting, tuple[Keyframe, Keyframe] | None]:
+    def remember_late(self, waiting: WaitingClosure) -> tuple[WaitingClosure, tuple[Keyframe, Keyframe] | None]:
         """Write a late constraint down, and merge the landmarks that it says are one. It holds without that, too.
 
         It comes with its keyframes, the new one and the stored; without them where one is not in the store.
@@ -100,9 +104,9 @@ class Recollection:
             return waiting, (self.store.keyframe(waiting.source_id), self.store.keyframe(waiting.target_id))
         return waiting, None
 
-    def _meet(self, keyframe: Keyframe, accepted: Sequence[Accepted]) -> None:
-        for item in accepted:
-            self.index.meet(keyframe.session, item.target.session)
+    def _meet(self, keyframe: Keyframe, accepted: Sequence[Decision]) -> None:
+        for decision in accepted:
+            self.index.meet(keyframe.session, decision.target.session)
 
     def _forget_surplus(self, named: Sequence[Sighting]) -> None:
         spare = self.landmarks.surplus(sighting.landmark for sighting in named)

@@ -177,8 +177,8 @@ class Registrar:
             track.relocalisation.receive(closure, keyframe, item.target)
         if not proven:
             track.wait_for_proof(found.accepted, keyframe, named)
-        for held in found.held:
-            track.hold(held, keyframe, named)
+        for decision in found.waiting:
+            track.hold(decision, keyframe, named)
         outcome = Outcome(
             closures=closures,
             rejected=(*before, *found.refused),
@@ -246,8 +246,8 @@ class Registrar:
                 track.thinning.recall(self._recollection.ties_of(keyframe.camera))
             found = self._try([one for one in candidates if one.keyframe_id in stored], keyframe, track, budget)
             closures = self._recollection.remember_closures(keyframe, found.accepted)
-            for held in found.held:
-                track.hold(held, keyframe, self._recollection.as_known(keyframe, held.item))
+            for decision in found.waiting:
+                track.hold(decision, keyframe, self._recollection.as_known(keyframe, decision))
             outcome = Outcome(closures=closures, rejected=(*before, *found.refused), robot=keyframe.robot)
             return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
 

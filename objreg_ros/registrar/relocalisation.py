@@ -41,7 +41,7 @@ MOST_STEPS = 4096  # of the path that are kept: a search of a keyframe ends late
 ROUNDS = 4  # of averaging rotations: the mean of poses that agree has settled by then
 
 
-class Tie(NamedTuple):
+class SessionTie(NamedTuple):
     """A closure to an earlier session, with the ``covariance`` (6, 6) of its pose."""
 
     statement: Statement
@@ -89,7 +89,7 @@ class Relocalisation:
     def _begin(self, session: int, began_ns: int) -> None:
         """Forget everything: the frames from ``began_ns`` on are in odometry of their own."""
         self._session, self._began_ns = session, began_ns
-        self._ties: list[Tie] = []
+        self._ties: list[SessionTie] = []
         self._received = Counter[int]()  # closures, by the earlier session
         self._camera: tuple[int, Array] | None = None  # the newest: stamp and T_odom_camera
         self._map: int | None = None  # the session in whose map the camera is
@@ -137,7 +137,7 @@ class Relocalisation:
             self._weigh(tie)
             self._ties = [*self._ties, tie][-MOST:]
 
-    def _weigh(self, tie: Tie) -> None:
+    def _weigh(self, tie: SessionTie) -> None:
         """Renew the answer with a tie, if it is believed."""
         target = tie.statement.target.session
         if self._map not in (None, target):
@@ -206,11 +206,11 @@ def fused(poses: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     return T, np.asarray(0.5 * (covariance + covariance.T))
 
 
-def _tie(closure: LoopClosure, source: Keyframe, target: Keyframe) -> Tie:
+def _tie(closure: LoopClosure, source: Keyframe, target: Keyframe) -> SessionTie:
     odds = closure.evidence.get("odds", 0.0)
     confirmed = closure.evidence.get("agreeing", 0.0) >= SUPPORTERS
     statement = Statement(Standpoint.of(source), Standpoint.of(target), closure.T_from_to, odds, True)
-    return Tie(statement, closure.covariance, confirmed, source.by_odometry and target.by_odometry)
+    return SessionTie(statement, closure.covariance, confirmed, source.by_odometry and target.by_odometry)
 
 
 def _distinct(one: Statement, other: Statement) -> bool:

@@ -294,7 +294,7 @@ class SegmenterNode(SynchronisedNode):
         awaited = not self._inputs.camera and self._colour_info is None and self.count_publishers(COLOUR_INFO) > 0
         return colour_frame.Cameras(camera_info, self._colour_info, named, awaited)
 
-    def _log_lens(self, seen: colour_frame.Seen) -> None:
+    def _log_lens(self, seen: colour_frame.SeenFrame) -> None:
         """Say once, and again where it changes, what is assumed of the lens and how depth is registered."""
         lens = self.read("camera_info", lenses.describe, seen.camera_info, seen.raw)
         if lens != self._lens:
@@ -304,7 +304,9 @@ class SegmenterNode(SynchronisedNode):
             self._registered = seen.registered
             self.get_logger().info(seen.registered or "depth is registered to colour as it comes")
 
-    def _depth(self, match: Match, camera_info: Any, raw: lenses.Raw) -> tuple[colour_frame.Seen, PointCloud | None]:
+    def _depth(
+        self, match: Match, camera_info: Any, raw: lenses.Raw
+    ) -> tuple[colour_frame.SeenFrame, PointCloud | None]:
         """The depth image in the picture of colour, and the cloud where it comes of one."""
         picture_frame = headers.frame_id(match["detections"])
         if "camera_info" in match.payloads:
@@ -317,7 +319,7 @@ class SegmenterNode(SynchronisedNode):
         cloud = colour_frame.in_optical_frame(cloud, picture_frame, self._find_pose)
         camera = self.read("camera_info", camera_from_msg.camera_of_cloud, camera_info, cloud, self.most_pixels)
         with self.accounting.timed("organise"):
-            return colour_frame.Seen(organise(cloud, camera), camera_info, raw), cloud
+            return colour_frame.SeenFrame(organise(cloud, camera), camera_info, raw), cloud
 
     def _publish(self, frame: Frame, names: to_msg.Labels) -> None:
         self._objects.publish(frame, partial(to_msg.objects, frame, names))

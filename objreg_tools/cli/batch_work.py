@@ -13,7 +13,7 @@ from typing import Any
 
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.whole_file import write_whole
-from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.recording.troubles import troubles
 from objreg_tools.report.batch.batch_schema import require_result
 from objreg_tools.report.run.about import about
@@ -27,13 +27,13 @@ DIGITS = 8  # of the digest of a recording's path: recordings of one name have f
 class BatchWork:
     """Runs recordings into JSON files of a ``folder``. ``made`` is what every result depends on, by name."""
 
-    asked: Asked
+    asked: RecordedOptions
     folder: Path
     arguments: tuple[str, ...]
     made: Mapping[str, Any]
 
     @classmethod
-    def of(cls, asked: Asked, folder: Path, arguments: tuple[str, ...]) -> BatchWork:
+    def of(cls, asked: RecordedOptions, folder: Path, arguments: tuple[str, ...]) -> BatchWork:
         """The work of these settings; OSError where there is no such model."""
         model = asked.settings.of("detector", DetectorParams).model
         facts = about(Path(), model, asked.settings.changed(), arguments)

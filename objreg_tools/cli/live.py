@@ -18,7 +18,7 @@ from objreg_tools.cli.processes import Processes
 from objreg_tools.cli.verbosity import is_quiet, is_verbose
 
 if TYPE_CHECKING:
-    from objreg_ros.bridge.streams.collector import Collector, Sight
+    from objreg_ros.bridge.streams.collector import Collector, LastDetections
 
 STAGES = ("detector", "segmenter", "registrar")
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
@@ -33,7 +33,7 @@ class Live:
     counters: Mapping[str, Balance]
     rejected: Mapping[str, int]
     closures: tuple[LoopClosure, ...]
-    sight: Sight | None = None
+    sight: LastDetections | None = None
     refusals: tuple[Rejected, ...] = ()
     glimpses: tuple[Mapping[str, Any], ...] = ()
 

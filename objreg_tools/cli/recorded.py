@@ -47,7 +47,7 @@ CAMERAS_OWN = (
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class RecordedOptions:
     """How recordings are run: the settings of the nodes, the topics, and how far."""
 
     settings: Settings
@@ -68,7 +68,7 @@ class Asked:
         odometry: str | None,
         max_frames: int | None,
         detections: str | None = None,
-    ) -> Asked:
+    ) -> RecordedOptions:
         """The values of the options of `options.of_run`; ValueError for those refused before any recording is read."""
         _require_seed(odometry)
         named = {"detector.model": model, "detector.labels": labels, "segmenter.camera": camera}
@@ -125,7 +125,7 @@ class Asked:
 class Opened:
     """A recording that is open, with what is taken of it."""
 
-    asked: Asked
+    asked: RecordedOptions
     path: Path
     source: Recording
     inputs: Inputs

@@ -29,7 +29,7 @@ from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
 from objreg_ros.segmenter.gravity.imu import Imu
 from objreg_tools.offline.run import Run, glimpse, tracked
-from objreg_tools.offline.stages import Outcome, Stages
+from objreg_tools.offline.stages import FrameOutcome, Stages
 from objreg_tools.recording.inputs import Inputs
 from objreg_tools.recording.mounts import is_moving
 from objreg_tools.recording.record import Record
@@ -279,7 +279,7 @@ class Line:
     def _on_of_mount(self, text: str) -> None:
         self.run.mount = text
 
-    def _note(self, outcome: Outcome) -> None:
+    def _note(self, outcome: FrameOutcome) -> None:
         self.run.closures += outcome.closures
         self.run.refusals += outcome.rejected
         self.run.rejected.update(refusal.reason.value for refusal in outcome.rejected)

@@ -47,7 +47,7 @@ class Segments(Protocol):
     ) -> Frame: ...
 
 
-class Outcome(Protocol):
+class FrameOutcome(Protocol):
     """The registrar's result for a frame."""
 
     @property
@@ -65,9 +65,9 @@ class Registers(Protocol):
         """The session of the newest frame and where the camera is in it, if that was followed."""
         ...
 
-    def process(self, frame: Frame) -> Outcome: ...
+    def process(self, frame: Frame) -> FrameOutcome: ...
 
-    def finish(self, doubt: str = "") -> Outcome: ...
+    def finish(self, doubt: str = "") -> FrameOutcome: ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from objreg_ros.bridge.camera.chains import body_of
-from objreg_ros.bridge.camera.frames import FrameTree, Tie
-from objreg_ros.bridge.camera.mount import Body, nameless_body
+from objreg_ros.bridge.camera.frames import FrameTie, FrameTree
+from objreg_ros.bridge.camera.mount import OdometryBody, nameless_body
 from objreg_ros.data.checked import Array
 from objreg_tools.recording.inputs import Inputs
 from objreg_tools.recording.record import Record, Recording
@@ -74,7 +74,7 @@ class Mounted(NamedTuple):
     body: str
     camera: str
     T_body_camera: Array | None
-    tie: Tie | None
+    tie: FrameTie | None
 
 
 def camera_on_body(recording: Recording, inputs: Inputs) -> Mounted:
@@ -84,7 +84,7 @@ def camera_on_body(recording: Recording, inputs: Inputs) -> Mounted:
         return Mounted("", "", None, None)
     tree = frame_tree(recording, camera)
     body = getattr(odom, "child_frame_id", "").lstrip("/")
-    if not body and nameless_body(inputs.odom or "", hasattr(odom, "child_frame_id")) is Body.BASE:
+    if not body and nameless_body(inputs.odom or "", hasattr(odom, "child_frame_id")) is OdometryBody.BASE:
         body = body_of(tree, frame_of(odom), camera)
     if not body:
         return Mounted("", "", None, None)

@@ -17,7 +17,7 @@ from objreg_tools.recording.record import Recording
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class SummaryLine:
     """One topic: how often it came, and what its first message is."""
 
     topic: str
@@ -27,12 +27,14 @@ class Line:
     what: str
 
 
-def describe_topics(recording: Recording) -> list[Line]:
+def describe_topics(recording: Recording) -> list[SummaryLine]:
     """A line a topic, in order of name. The rate is None for fewer than two messages."""
     lines = []
     for topic in recording.topics.values():
         rate = (topic.count - 1) / recording.seconds if topic.count > 1 and recording.seconds > 0 else None
-        lines.append(Line(topic.name, topic.msgtype, topic.count, rate, _what(recording, topic.name, topic.msgtype)))
+        lines.append(
+            SummaryLine(topic.name, topic.msgtype, topic.count, rate, _what(recording, topic.name, topic.msgtype))
+        )
     return lines
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from rosbags.interfaces import Qos
 
 from objreg_ros.bridge.camera.chains import moved, names_of, odometry_edge, truth_edge
-from objreg_ros.bridge.camera.frames import Edge, FrameTree
+from objreg_ros.bridge.camera.frames import FrameEdge, FrameTree
 from objreg_ros.bridge.messages import motion_from_msg
 from objreg_tools.recording.inputs import TF_ODOM, TF_TRUTH, Inputs, choose_inputs
 from objreg_tools.recording.mounts import first_frames, first_readable, frame_of, frame_tree, moving_topics
@@ -27,7 +27,9 @@ UNCERTAIN = np.eye(6)  # /tf has no covariance
 class WithTransforms(Recording):
     """The recording ``of``, with the odometry and the truth of its camera by /tf on `TF_ODOM` and `TF_TRUTH`."""
 
-    def __init__(self, of: Recording, tree: FrameTree, camera: str, odom: Edge | None, truth: Edge | None) -> None:
+    def __init__(
+        self, of: Recording, tree: FrameTree, camera: str, odom: FrameEdge | None, truth: FrameEdge | None
+    ) -> None:
         self._of, self._tree, self._camera = of, tree, camera
         self.path, self.kind, self.notes = of.path, of.kind, list(of.notes)
         self.start_ns, self.end_ns = of.start_ns, of.end_ns

@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.bridge.camera import colour_frame, lenses
 from objreg_ros.bridge.camera.camera_checks import check_camera
-from objreg_ros.bridge.camera.frames import Tie
+from objreg_ros.bridge.camera.frames import FrameTie
 from objreg_ros.bridge.messages import camera_from_msg, from_msg
 from objreg_ros.data.checked import Array
 from objreg_ros.data.images import Intrinsics
@@ -184,9 +184,9 @@ def _mount_of_camera(recording: Recording, inputs: Inputs) -> list[str]:
     """Whether it is known how the camera sits on the body of the odometry."""
     mounted = camera_on_body(recording, inputs)
     body, camera = mounted.body, mounted.camera
-    if mounted.tie is Tie.MOVING:
+    if mounted.tie is FrameTie.MOVING:
         return [f"the camera's {camera} moves on the odometry's {body} by a joint on /tf, which is followed"]
-    if mounted.tie is Tie.CONSTANT and body != camera:
+    if mounted.tie is FrameTie.CONSTANT and body != camera:
         return [f"the camera's {camera} is mounted on the odometry's {body} by /tf, which repeats the same"]
     if mounted.tie is not None or body == camera:
         return []

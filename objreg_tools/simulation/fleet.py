@@ -17,7 +17,7 @@ import numpy as np
 
 from objreg_tools.simulation.scenarios import RecordingPlan
 from objreg_tools.simulation.trajectory import Hand, Waypoint, carried
-from objreg_tools.simulation.visits import Look
+from objreg_tools.simulation.visits import CameraLook
 from objreg_tools.simulation.world.building import OPENINGS_X, ROOMS_X, Building, make_building
 from objreg_tools.simulation.world.scene import Scene
 
@@ -52,7 +52,7 @@ def _way(rng: Random, building: Building, route: Sequence[int], aside: float) ->
             way += _through(route[k - 1], room)
         sweep = float(rng.choice([-1, 1])) * 40
         start = building.fronts[room] + off + float(rng.uniform(-10, 10)) - sweep / 2
-        way += Look.at_random(rng, start, sweep).waypoints(building.scene.places[room].centre)
+        way += CameraLook.at_random(rng, start, sweep).waypoints(building.scene.places[room].centre)
     return way
 
 

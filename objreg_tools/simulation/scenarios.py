@@ -23,7 +23,7 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_ros.geometry import transform
 from objreg_tools.simulation.trajectory import Hand, Waypoint, around, carried
-from objreg_tools.simulation.visits import Look, between
+from objreg_tools.simulation.visits import CameraLook, between
 from objreg_tools.simulation.world import distractors, furniture, print_design
 from objreg_tools.simulation.world.furniture import Furniture
 from objreg_tools.simulation.world.mesh import Material
@@ -137,7 +137,7 @@ def _look_alikes(rng: Random, models: list[ObjectModel]) -> list[ObjectModel]:
     return out
 
 
-def _rounds(setting: _Setting, looks: list[Look]) -> list[Waypoint]:
+def _rounds(setting: _Setting, looks: list[CameraLook]) -> list[Waypoint]:
     """The path past the two tables in turn, seen as the looks say."""
     visits = [look.waypoints(setting.centre(k % 2)) for k, look in enumerate(looks)]
     way = visits[0]
@@ -152,18 +152,21 @@ def _facing(setting: _Setting, k: int) -> float:
     return float(np.degrees(np.arctan2(towards[1], towards[0])))
 
 
-def _looks(rng: Random, setting: _Setting, asides: list[float]) -> list[Look]:
+def _looks(rng: Random, setting: _Setting, asides: list[float]) -> list[CameraLook]:
     """A look at each table, and for every one of ``asides`` another at each, so many degrees further around."""
     sign = float(rng.choice([-1, 1]))
     front, back = _facing(setting, 0), _facing(setting, 1)
-    looks = [Look.at_random(rng, front - sign * 70, sign * 40), Look.at_random(rng, back + sign * 30, -sign * 40)]
+    looks = [
+        CameraLook.at_random(rng, front - sign * 70, sign * 40),
+        CameraLook.at_random(rng, back + sign * 30, -sign * 40),
+    ]
     for aside in asides:
-        looks.append(Look.at_random(rng, front - sign * 50 + sign * aside, -sign * 25))
-        looks.append(Look.at_random(rng, back + sign * 10 + sign * aside, sign * 25))
+        looks.append(CameraLook.at_random(rng, front - sign * 50 + sign * aside, -sign * 25))
+        looks.append(CameraLook.at_random(rng, back + sign * 10 + sign * aside, sign * 25))
     return looks
 
 
-def _a_little_aside(rng: Random, setting: _Setting) -> list[Look]:
+def _a_little_aside(rng: Random, setting: _Setting) -> list[CameraLook]:
     """Three rounds: the second and the third see both tables from a little to the left and to the right."""
     side = float(rng.choice([-1, 1]))
     return _looks(rng, setting, [side * float(rng.uniform(15, 35)), -side * float(rng.uniform(15, 35))])
@@ -172,7 +175,7 @@ def _a_little_aside(rng: Random, setting: _Setting) -> list[Look]:
 def _orbit(rng: Random, occluders: int) -> Plot:
     setting = _setting(rng, occluders)
     start = float(rng.uniform(0, 360))
-    look = Look.at_random(rng, start, float(rng.choice([-1, 1])) * 385)
+    look = CameraLook.at_random(rng, start, float(rng.choice([-1, 1])) * 385)
     way = around(setting.centre(0), look.radius, look.height, look.start, look.stop, count=40)
     return (setting.scene_with(setting.on_table),), way, None
 

@@ -86,7 +86,7 @@ class TrueFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class SimulationTruth:
     """The truth of a recording; ``objects`` of every scene by instance number, ``frames`` in order of time.
 
     ``sensors`` are the parameters it was made with, by section and name; empty in older recordings.
@@ -112,7 +112,7 @@ class Truth:
         return np.asarray(cv2.imdecode(png, cv2.IMREAD_UNCHANGED), np.uint16)
 
 
-def read_truth(recording: Path | str) -> Truth:
+def read_truth(recording: Path | str) -> SimulationTruth:
     """The truth in the folder of a simulated recording.
 
     FileNotFoundError where there is none, ValueError for another format.
@@ -130,7 +130,7 @@ def read_truth(recording: Path | str) -> Truth:
     frames = tuple(_frame(json.loads(line), objects) for line in lines[1:])
     camera = Intrinsics(**head["camera"])
     made_with = head.get("sensors", {})
-    return Truth(folder, head["scenario"], head["seed"], head["rate"], camera, objects, frames, made_with)
+    return SimulationTruth(folder, head["scenario"], head["seed"], head["rate"], camera, objects, frames, made_with)
 
 
 def _object(o: dict[str, Any]) -> TrueObject:

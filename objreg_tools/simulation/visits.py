@@ -14,7 +14,7 @@ Random = np.random.Generator
 
 
 @dataclass(frozen=True)
-class Look:
+class CameraLook:
     """How a table is looked at: from which azimuths in degrees, how far and how high above its top in metres."""
 
     start: float
@@ -23,7 +23,7 @@ class Look:
     height: float
 
     @classmethod
-    def at_random(cls, rng: Random, start: float, sweep: float) -> Look:
+    def at_random(cls, rng: Random, start: float, sweep: float) -> CameraLook:
         return cls(start, start + sweep, float(rng.uniform(1.05, 1.3)), float(rng.uniform(0.5, 0.75)))
 
     def waypoints(self, centre: Array) -> list[Waypoint]:

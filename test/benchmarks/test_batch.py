@@ -54,7 +54,7 @@ def test_a_run_is_told_by_how_much_faster_it_was_than_the_first(batch: ModuleTyp
 
 
 def test_a_recording_without_a_result_is_an_error(batch: ModuleType, tmp_path: Path) -> None:
-    work = batch.BatchWork.of(batch.Asked(batch.read_settings(None, [])), tmp_path, ())
+    work = batch.BatchWork.of(batch.RecordedOptions(batch.read_settings(None, [])), tmp_path, ())
     with pytest.raises(OSError, match="gone: expected its result, got none"):
         batch._written(work, [tmp_path / "gone"])
 

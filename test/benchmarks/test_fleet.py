@@ -12,7 +12,7 @@ from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import View
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose
-from objreg_tools.report.run.revisits import Seen
+from objreg_tools.report.run.revisits import SeenPlace
 from objreg_tools.truth import Truth, Truths
 
 SECOND = 10**9
@@ -25,25 +25,27 @@ WAYS = {
 """Seconds and metres along the wall, of the keyframes of each robot."""
 
 
-def wall(seconds: float, x: float) -> Seen:
+def wall(seconds: float, x: float) -> SeenPlace:
     """What a camera at (x, 0, 0) sees of the wall z = 2 m."""
     v, u = np.mgrid[:30, :40]
     rays = np.stack([(u - CAMERA.cx) / CAMERA.fx, (v - CAMERA.cy) / CAMERA.fy, np.ones(u.shape)], axis=-1)
     view = View(xyz=(2.0 * rays).astype(np.float32), grey=None, intrinsics=CAMERA)
-    return Seen(int(seconds * SECOND), view, pose(np.eye(3), np.array([x, 0.0, 0.0])))
+    return SeenPlace(int(seconds * SECOND), view, pose(np.eye(3), np.array([x, 0.0, 0.0])))
 
 
 @pytest.fixture
-def seen() -> dict[str, list[Seen]]:
+def seen() -> dict[str, list[SeenPlace]]:
     return {robot: [wall(*at) for at in way] for robot, way in WAYS.items()}
 
 
 @pytest.fixture
-def truths(seen: dict[str, list[Seen]]) -> Truths:
+def truths(seen: dict[str, list[SeenPlace]]) -> Truths:
     return Truths({robot: Truth((m.stamp_ns, m.T_world_camera) for m in moments) for robot, moments in seen.items()})
 
 
-def tie(seen: dict[str, list[Seen]], one: tuple[str, int], other: tuple[str, int], off: float = 0.0) -> LoopClosure:
+def tie(
+    seen: dict[str, list[SeenPlace]], one: tuple[str, int], other: tuple[str, int], off: float = 0.0
+) -> LoopClosure:
     """A constraint between two keyframes by robot and number, ``off`` metres wrong."""
     a, b = (seen[robot][k] for robot, k in (one, other))
     T = inverse(a.T_world_camera) @ b.T_world_camera
@@ -52,7 +54,7 @@ def tie(seen: dict[str, list[Seen]], one: tuple[str, int], other: tuple[str, int
     return LoopClosure(from_ns=a.stamp_ns, to_ns=b.stamp_ns, T_from_to=T, **told)
 
 
-def test_a_meeting_is_a_keyframe_that_saw_what_another_robot_had_seen_before(seen: dict[str, list[Seen]]) -> None:
+def test_a_meeting_is_a_keyframe_that_saw_what_another_robot_had_seen_before(seen: dict[str, list[SeenPlace]]) -> None:
     from fleet import meetings
 
     found = [(m.earlier, m.later, m.revisit.to_ns // SECOND) for m in meetings(seen)]
@@ -68,7 +70,7 @@ def test_a_meeting_is_a_keyframe_that_saw_what_another_robot_had_seen_before(see
     assert sorted(found) == sorted(expected)
 
 
-def test_meetings_that_follow_each_other_are_one_stretch(seen: dict[str, list[Seen]]) -> None:
+def test_meetings_that_follow_each_other_are_one_stretch(seen: dict[str, list[SeenPlace]]) -> None:
     from fleet import meetings, stretches
 
     spans = [
@@ -78,7 +80,9 @@ def test_meetings_that_follow_each_other_are_one_stretch(seen: dict[str, list[Se
     assert spans == [("a", "b", [10, 11]), ("a", "b", [20]), ("c", "b", [10, 11]), ("a", "c", [1]), ("b", "c", [31])]
 
 
-def test_a_right_constraint_closes_its_keyframe_and_its_stretch(seen: dict[str, list[Seen]], truths: Truths) -> None:
+def test_a_right_constraint_closes_its_keyframe_and_its_stretch(
+    seen: dict[str, list[SeenPlace]], truths: Truths
+) -> None:
     from fleet import judged, meetings
 
     ties = [tie(seen, ("a", 0), ("b", 1)), tie(seen, ("c", 1), ("b", 4)), tie(seen, ("a", 2), ("b", 3), off=1.0)]
@@ -90,7 +94,7 @@ def test_a_right_constraint_closes_its_keyframe_and_its_stretch(seen: dict[str, 
     assert told["robots"]["a-b"] == {"closed": 1, "of": 2} and told["robots"]["c-b"] == {"closed": 0, "of": 1}
 
 
-def test_without_constraints_nothing_is_closed(seen: dict[str, list[Seen]], truths: Truths) -> None:
+def test_without_constraints_nothing_is_closed(seen: dict[str, list[SeenPlace]], truths: Truths) -> None:
     from fleet import judged, meetings
 
     told = judged(meetings(seen), [], truths)

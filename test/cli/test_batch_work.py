@@ -10,7 +10,7 @@ from recording.sample_folders import tum_folder
 
 from objreg_tools.cli import batch_work
 from objreg_tools.cli.batch_work import BatchWork
-from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 
 RESULT = {
@@ -24,7 +24,7 @@ RESULT = {
 
 
 def work(folder: Path, *changes: str) -> BatchWork:
-    return BatchWork.of(Asked(read_settings(None, changes)), folder, ("batch",))
+    return BatchWork.of(RecordedOptions(read_settings(None, changes)), folder, ("batch",))
 
 
 def test_a_result_holds_until_a_setting_or_the_recording_changes(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from objreg_tools.cli import download as module
-from objreg_tools.cli.commands.fetch_model import Source, fetch
+from objreg_tools.cli.commands.fetch_model import ModelSource, fetch
 from objreg_tools.cli.download import download
 
 Answering = Callable[[socket.socket], None]
@@ -196,7 +196,7 @@ def test_what_arrived_slowly_stays_for_the_next_time_and_the_next_mirror(
     monkeypatch.setattr(module, "GRACE_S", 0.5)
     slow, other = serve(partial(drip, OK + b"\r\n", b"x")), serve(partial(drip, b"", b"y"))
     with pytest.raises(ValueError, match=r"(?s)got .*10000 bytes a second.*10000 bytes a second.*Try again to go on"):
-        fetch(Source("some.onnx", (slow.url(), other.url()), "00"), tmp_path / "some.onnx")
+        fetch(ModelSource("some.onnx", (slow.url(), other.url()), "00"), tmp_path / "some.onnx")
     assert other.asked == 1 and set((tmp_path / "some.onnx.part").read_bytes()) == {ord("x")}
 
 

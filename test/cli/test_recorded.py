@@ -8,7 +8,7 @@ import pytest
 from recording.sample_folders import tum_folder
 from recording.vision import detected_bag
 
-from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 from objreg_tools.recording import Record, open_recording, write_rosbag2
 from objreg_tools.recording.drift import with_drifting_odometry
@@ -22,17 +22,17 @@ def with_odometry(folder: Path) -> list[Record]:
 
 
 def test_named_options_are_settings_of_the_nodes() -> None:
-    asked = Asked.of(**{**NOTHING, "labels": "names.txt"}, odometry=None, max_frames=None)
+    asked = RecordedOptions.of(**{**NOTHING, "labels": "names.txt"}, odometry=None, max_frames=None)
     assert asked.settings.changed() == {"detector.labels": "names.txt"}
 
 
 def test_a_drift_without_a_seed_is_refused() -> None:
     with pytest.raises(ValueError, match="expected drift: and a seed"):
-        Asked.of(**NOTHING, odometry="drift:", max_frames=None)
+        RecordedOptions.of(**NOTHING, odometry="drift:", max_frames=None)
 
 
 def test_no_more_frames_are_expected_than_are_asked_for(tmp_path: Path) -> None:
-    asked = Asked(read_settings(None, ()))
+    asked = RecordedOptions(read_settings(None, ()))
     folder = tum_folder(tmp_path, frames=4)
     with asked.opened(folder) as whole, replace(asked, max_frames=3).opened(folder) as part:
         assert (whole.frames, part.frames) == (4, 3) and whole.inputs.depth == "/depth/image"
@@ -40,7 +40,7 @@ def test_no_more_frames_are_expected_than_are_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_recording_without_odometry_is_tracked_unless_it_is_asked_for_none(tmp_path: Path) -> None:
-    asked = Asked(read_settings(None, ()))
+    asked = RecordedOptions(read_settings(None, ()))
     folder = tum_folder(tmp_path, frames=2)
     known = []
     for odometry in (None, "tracked", "none", "drift:1"):
@@ -50,7 +50,7 @@ def test_a_recording_without_odometry_is_tracked_unless_it_is_asked_for_none(tmp
 
 
 def test_recorded_detections_are_run_without_the_detector(tmp_path: Path) -> None:
-    asked = Asked(read_settings(None, ()), detections="/yolo/detections")
+    asked = RecordedOptions(read_settings(None, ()), detections="/yolo/detections")
     with asked.opened(detected_bag(tmp_path / "bag", frames=2)) as opened:
         run = opened.run()
         summary = opened.summary(run, ())
@@ -60,7 +60,7 @@ def test_recorded_detections_are_run_without_the_detector(tmp_path: Path) -> Non
 
 def test_odometry_that_is_there_is_left_out_where_tracking_is_asked_for(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", with_odometry(tum_folder(tmp_path / "tum", frames=2)))
-    asked = Asked(read_settings(None, ()))
+    asked = RecordedOptions(read_settings(None, ()))
     with asked.opened(tmp_path / "bag") as opened, replace(asked, odometry="tracked").opened(tmp_path / "bag") as other:
         assert (opened.odometry, opened.inputs.odom) == ("/drifting_odom", "/drifting_odom")
         assert (other.odometry, other.inputs.odom) == ("tracked", None)

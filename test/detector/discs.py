@@ -10,7 +10,7 @@ import numpy as np
 
 from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.data.images import Intrinsics
-from objreg_ros.detector.picture import Place
+from objreg_ros.detector.picture import Placement
 
 from .tiny_model import save_constant_model
 
@@ -32,7 +32,7 @@ def height_over(hw: tuple[int, int], disc: Disc, rows: np.ndarray, columns: np.n
 
 def prototypes(hw: tuple[int, int], step: int = 4) -> np.ndarray:
     """(1, 32, h, w): two discs in the picture that a letterbox of the model shows, each a prototype."""
-    place = Place.of(hw, MODEL_HW, "centre")
+    place = Placement.of(hw, MODEL_HW, "centre")
     middles = [(np.arange(side // step) + 0.5) * step for side in MODEL_HW]
     rows = (middles[0] - place.top) * hw[0] / place.height
     columns = (middles[1] - place.left) * hw[1] / place.width
@@ -43,7 +43,7 @@ def prototypes(hw: tuple[int, int], step: int = 4) -> np.ndarray:
 
 def row_of(hw: tuple[int, int], disc: Disc, margin: float = 1.2) -> list[float]:
     """cx cy w h in pixels of the model's picture."""
-    place = Place.of(hw, MODEL_HW, "centre")
+    place = Placement.of(hw, MODEL_HW, "centre")
     (x, y, radius), (sx, sy) = pixels(hw, disc), (place.width / hw[1], place.height / hw[0])
     return [x * sx + place.left, y * sy + place.top, 2 * radius * margin * sx, 2 * radius * margin * sy]
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.detector.picture import Look, Picture, Place, read_imgsz
+from objreg_ros.detector.picture import Look, Picture, Placement, read_imgsz
 from objreg_ros.detector.runtime import Port
 
 
@@ -92,9 +92,9 @@ def test_what_is_seen_in_the_models_picture_comes_back_where_it_was(
 
 
 def test_a_picture_in_the_centre_is_between_grey_and_one_at_the_corner_before_it() -> None:
-    assert Place.of((480, 640), (640, 640), "centre") == Place((480, 640), (640, 640), 80, 0, 480, 640)
-    assert Place.of((480, 640), (640, 640), "corner") == Place((480, 640), (640, 640), 0, 0, 480, 640)
-    assert Place.of((480, 639), (416, 416), "centre").top == 52  # of 104 - 1 rows, the smaller half is above
+    assert Placement.of((480, 640), (640, 640), "centre") == Placement((480, 640), (640, 640), 80, 0, 480, 640)
+    assert Placement.of((480, 640), (640, 640), "corner") == Placement((480, 640), (640, 640), 0, 0, 480, 640)
+    assert Placement.of((480, 639), (416, 416), "centre").top == 52  # of 104 - 1 rows, the smaller half is above
     picture = Picture.of((Port("x", "float", (1, 3, 64, 64)),), {})
     look = Look(fit="centre", bgr=True, mean=0.0, scale=1 / 255)
     tensor = picture.asked(look, {}).tensor(np.full((32, 64, 3), (255, 0, 51), np.uint8))[0]

@@ -171,7 +171,9 @@ def test_odometry_that_begins_anew_elsewhere_is_on_the_map_once_constraints_tie_
     assert headers.stamp_ns(outside.corrections[-1]) < walk[HALF].stamp_ns  # where it is now nobody knows
     outside.send(ROUND_TRIP)
     outside.wait(lambda: outside.node.extra_diagnostics()["placed in the map"] and outside.settled())
-    outside.wait(lambda: outside.paths[-1].poses and np.linalg.norm(end_of(outside.paths[-1])[:3, 3]) < 0.5)
+    outside.wait(
+        lambda: outside.paths and outside.paths[-1].poses and np.linalg.norm(end_of(outside.paths[-1])[:3, 3]) < 0.5
+    )
 
 
 def test_two_publishers_of_odometry_do_not_fill_the_log(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from objreg_mapper.params import MapperParams
-from objreg_mapper.sessions import Moment, Sessions, moments_of
+from objreg_mapper.sessions import Sessions, StampedFrame, moments_of
 
 from .bent import SECOND, closure, odometry, square
 
@@ -25,8 +25,8 @@ def driven(*runs: tuple[str, int, int]) -> Sessions:
     return sessions
 
 
-def at(robot: str, step: int, name: int | None = None) -> Moment:
-    return Moment(robot, name, step * SECOND // 10)
+def at(robot: str, step: int, name: int | None = None) -> StampedFrame:
+    return StampedFrame(robot, name, step * SECOND // 10)
 
 
 def test_a_moment_is_of_its_robot_s_session() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from objreg_mapper.follower import Follower, Followers
 from objreg_mapper.pose_graph import PoseGraph
-from objreg_mapper.waiting import Waiting
+from objreg_mapper.waiting import ClosureQueue
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose
@@ -20,7 +20,9 @@ from .bent import closure, odometry, square
 TRUE = square(per_side=12, laps=2)
 
 
-def driven(robots: tuple[str, ...] = ("",), steps: range = range(len(TRUE))) -> tuple[PoseGraph, Waiting, list[str]]:
+def driven(
+    robots: tuple[str, ...] = ("",), steps: range = range(len(TRUE))
+) -> tuple[PoseGraph, ClosureQueue, list[str]]:
     """A graph, what waits for it, and the bodies that a camera was looked for on."""
     graph, bodies = PoseGraph(), list[str]()
     followers = Followers({robot: Follower(robot, 5.0, lambda: None) for robot in robots})
@@ -32,7 +34,7 @@ def driven(robots: tuple[str, ...] = ("",), steps: range = range(len(TRUE))) -> 
         bodies.append(words[0].child_frame_id)
         return None
 
-    return graph, Waiting(followers, find_mount, most=2), bodies
+    return graph, ClosureQueue(followers, find_mount, most=2), bodies
 
 
 def of(told: LoopClosure, one: str, other: str) -> LoopClosure:
@@ -83,7 +85,7 @@ def test_a_camera_is_looked_for_under_the_prefix_of_its_robot_where_the_body_has
     followers = Followers({"a": Follower("a", 5.0, lambda: None)})
     for word in odometry(TRUE):
         followers["a"].follow(replace(word, child_frame_id=f"{prefix}base"), graph)
-    waiting = Waiting(followers, lambda words, frame_id: frames.append(frame_id), most=2)
+    waiting = ClosureQueue(followers, lambda words, frame_id: frames.append(frame_id), most=2)
     told = replace(of(closure(TRUE, 10, 90), "a", "a"), from_frame_id="a/camera", to_frame_id="a/camera")
     waiting.closures = [told]
     assert [fate.reason for fate in waiting.tie(graph)] == [""] and set(frames) == {asked}

@@ -10,13 +10,13 @@ import pytest
 from numpy.random import Generator
 
 from objreg_ros.memory.descriptor import EMPHASIS, SIZE
-from objreg_ros.memory.nearest_neighbours import LANES, Block, Sessions
+from objreg_ros.memory.nearest_neighbours import LANES, Block, SessionFilter
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registrar.params import RegistrarParams
 
 PARAMS = RegistrarParams(min_gap=2.0, odometry_radius=1.0, odometry_drift=0.1)
 MOST, MARGIN = 8, 8.0
-OWN = Sessions.of((0, 1), ())
+OWN = SessionFilter.of((0, 1), ())
 
 
 def _sighting(number: int, draw: Generator, spread: float = 1.0) -> Sighting:
@@ -101,7 +101,7 @@ def test_what_another_robot_saw_at_the_same_time_may_be_here_and_hidden_sessions
         block.append(replace(pattern, keyframe_id=number, session=session))
     asked = replace(pattern, keyframe_id=9, session=3)
     found = {
-        hidden: block.when[block.nearest(asked, PARAMS, MOST, MARGIN, Sessions.of((3, 5), hidden))[0], 2].tolist()
+        hidden: block.when[block.nearest(asked, PARAMS, MOST, MARGIN, SessionFilter.of((3, 5), hidden))[0], 2].tolist()
         for hidden in ((), (7,))
     }
     assert found == {(): [3], (7,): []}

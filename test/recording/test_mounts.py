@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.camera.frames import Tie
+from objreg_ros.bridge.camera.frames import FrameTie
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_tools.recording import Record, open_recording, write_rosbag2
 from objreg_tools.recording.inputs import choose_inputs
@@ -34,7 +34,7 @@ def test_the_camera_on_the_body_of_the_odometry_is_what_tf_static_says_whenever(
     with open_recording(bag(tmp_path / "bag", late)) as source:
         assert static_topics(source) == ["/robot/tf_static"] and source.topics["/robot/tf_static"].msgtype == TRANSFORMS
         body, camera, T, tie = camera_on_body(source, choose_inputs(source.topics))
-        assert tie is Tie.STATIC
+        assert tie is FrameTie.STATIC
         assert (body, camera) == ("base", "eye") and pytest.approx(T_BODY_CAMERA, abs=1e-9) == T
         assert not [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]
 

@@ -99,7 +99,7 @@ def test_what_is_not_begun_in_time_is_refused_as_over_budget(means: Means) -> No
 def test_what_waits_for_others_counts_as_tried_and_closes_nothing(means: Means) -> None:
     waits = means._replace(confirmation=Confirmation(PARAMS.replaced(confirm_seconds=10.0)))
     accepted, held, refused = search(waits).run(ids(3, 1, 5, 2))
-    assert [one.item.target.keyframe_id for one in held] == [3, 1, 5] and not accepted and not refused
+    assert [one.target.keyframe_id for one in held] == [3, 1, 5] and not accepted and not refused
 
 
 def test_a_nicer_thread_gets_a_pool_of_its_own_and_the_same_one_again() -> None:

@@ -11,7 +11,7 @@ from registration.samples import box, candidate, keyframe
 
 from objreg_ros.data.closures import Reason
 from objreg_ros.memory.sighting import sightings_of
-from objreg_ros.registrar.closure import Accepted, closure_of, links_of, observations, rejected
+from objreg_ros.registrar.closure import Decision, closure_of, links_of, observations, rejected
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import ObjectPair
 
@@ -27,7 +27,7 @@ def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved(
     )
     pairs = [ObjectPair(k, k, "cup") for k in range(4)]
     sightings = [seen.of_landmark(number, np.eye(3)) for number, seen in enumerate(sightings_of(here), 7)]
-    accepted = Accepted(
+    accepted = Decision(
         target=replace(there, frame_id="front"), candidate=candidate(matched=pairs[:2], moved=pairs[2:])
     )
     closure = closure_of(here, sightings, accepted, PARAMS)
@@ -40,7 +40,7 @@ def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved(
 def test_a_closure_and_a_refusal_name_the_sessions_of_their_moments_as_far_as_they_are_known() -> None:
     here, refusal = replace(NEW, session=4), (Reason.OVER_BUDGET, "0 s")
     sightings = [seen.of_landmark(7, np.eye(3)) for seen in sightings_of(here)]
-    accepted = Accepted(target=STORED, candidate=candidate(matched=(ObjectPair(0, 0, "cup"),)))
+    accepted = Decision(target=STORED, candidate=candidate(matched=(ObjectPair(0, 0, "cup"),)))
     closure = closure_of(here, sightings, accepted, PARAMS)
     assert (closure.from_session, closure.to_session) == (STORED.session, 4)
     told, unread = rejected(1, here, refusal, STORED), rejected(1, here, refusal)
@@ -51,7 +51,7 @@ def test_a_closure_and_a_refusal_name_the_sessions_of_their_moments_as_far_as_th
 def test_a_link_says_which_stored_object_an_object_is_and_how_it_is_turned() -> None:
     found = candidate(matched=(ObjectPair(0, 0, "cup"),))
     stored = sightings_of(STORED)
-    (link,) = links_of(NEW, Accepted(target=STORED, candidate=found), stored)
+    (link,) = links_of(NEW, Decision(target=STORED, candidate=found), stored)
     assert link.index == 0 and link.of is stored[0]
     assert np.allclose(link.R_there_here, found.T_target_source[:3, :3])
 

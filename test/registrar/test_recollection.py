@@ -12,7 +12,7 @@ from registration.samples import SECOND, box, candidate, keyframe
 from objreg_ros.data.closures import Reason
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store, StoreError
-from objreg_ros.registrar.closure import Accepted, waiting_of
+from objreg_ros.registrar.closure import Decision, waiting_of
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration.candidate import ObjectPair
@@ -25,8 +25,8 @@ THEIRS = replace(NEW, keyframe_id=0, session=7, robot="b")
 TURNED = (ObjectPair(0, 1, "book"), ObjectPair(1, 0, "cup"))  # the new one has them the other way round
 
 
-def _accepted(target: Keyframe = STORED) -> Accepted:
-    return Accepted(target=target, candidate=candidate(matched=TURNED))
+def _accepted(target: Keyframe = STORED) -> Decision:
+    return Decision(target=target, candidate=candidate(matched=TURNED))
 
 
 def _begun(path: str = "") -> Recollection:
@@ -65,7 +65,7 @@ def test_a_closure_to_a_keyframe_of_others_goes_by_our_landmarks_and_leaves_them
 
 
 def test_objects_that_match_none_of_ours_have_no_landmark() -> None:
-    only = Accepted(target=STORED, candidate=candidate(matched=TURNED[:1]))
+    only = Decision(target=STORED, candidate=candidate(matched=TURNED[:1]))
     assert [one.landmark for one in _begun().as_known(THEIRS, only)] == [2, 0]
 
 

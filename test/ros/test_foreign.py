@@ -20,7 +20,7 @@ from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import Odometry
 from objreg_ros.data.images import Detections
 from objreg_tools.cli.commands.simulate import camera_of, sensors_of
-from objreg_tools.simulation.truth import TrueFrame, Truth, read_truth
+from objreg_tools.simulation.truth import SimulationTruth, TrueFrame, read_truth
 from objreg_tools.simulation.write import simulate
 from objreg_tools.truth import FALSE, within
 from objreg_tools.truth import Truth as TruePath
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.ros
 
 FRAMES, RATE_HZ = 14, 2.0
 STAGES = ("segmenter", "registrar")
-Told = Callable[[Truth, TrueFrame], dict[str, Any]]  # a frame → messages by topic
+Told = Callable[[SimulationTruth, TrueFrame], dict[str, Any]]  # a frame → messages by topic
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def fresh(domain: int, tmp_path: Path) -> Iterator[Graph]:
     made.close()
 
 
-def true_boxes(truth: Truth, frame: TrueFrame) -> Detections:
+def true_boxes(truth: SimulationTruth, frame: TrueFrame) -> Detections:
     """What a detector without a fault says."""
     seen = [sight for sight in frame.seen if not sight.object.is_distractor]
     return Detections(
@@ -65,19 +65,19 @@ def true_boxes(truth: Truth, frame: TrueFrame) -> Detections:
     )
 
 
-def names_of(truth: Truth) -> dict[int, str]:
+def names_of(truth: SimulationTruth) -> dict[int, str]:
     return dict(enumerate(sorted({one.label for objects in truth.objects for one in objects.values()})))
 
 
-def as_table(truth: Truth, frame: TrueFrame) -> dict[str, Any]:
+def as_table(truth: SimulationTruth, frame: TrueFrame) -> dict[str, Any]:
     return {"detections_table": to_msg.detections_table(true_boxes(truth, frame), names_of(truth))}
 
 
-def as_vision(truth: Truth, frame: TrueFrame) -> dict[str, Any]:
+def as_vision(truth: SimulationTruth, frame: TrueFrame) -> dict[str, Any]:
     return {"detections_in": vision_to_msg.detections(true_boxes(truth, frame))}
 
 
-def as_masks(truth: Truth, frame: TrueFrame) -> dict[str, Any]:
+def as_masks(truth: SimulationTruth, frame: TrueFrame) -> dict[str, Any]:
     known = [one.instance for one in truth.objects[frame.scene].values() if not one.is_distractor]
     numbers = truth.mask(frame.stamp_ns)
     numbers = np.where(np.isin(numbers, known), numbers, 0).astype("<u2")

@@ -97,7 +97,7 @@ def test_a_node_that_is_refused_ends_the_process_with_one_line(fresh: Graph, tmp
 @pytest.mark.slow
 def test_one_process_gives_the_constraints_of_three(fresh: Graph, shared: Path) -> None:
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
-    words = "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S)
+    words = "replay", str(kitchen), "--lossless", "--end", "3.6", "--wait", str(START_S)
     fresh.receive(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
     found = []
     for composed in (False, True):

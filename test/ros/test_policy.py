@@ -13,7 +13,7 @@ from objreg_ros.bridge.camera.transforms import is_installed
 from objreg_ros.bridge.messages import vision_to_msg
 from objreg_ros.bridge.messages.closures_msg import LoopClosureMsg
 from objreg_tools.cli.access import TF, Access, expanded
-from objreg_tools.cli.commands.policy import Asked
+from objreg_tools.cli.commands.policy import PolicyOptions
 
 from .graph import START_S, Graph
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.ros
 
 SPACE = "/robot1"
 MANAGED = ("-p managed:=true", f"-r __ns:={SPACE}", "-r /tf:=tf", "-r /tf_static:=tf_static", "-p use_sim_time:=true")
-ASKED = Asked(SPACE, robots={"r1": (), "r2": ("front",)}, exchange="/fleet")
+ASKED = PolicyOptions(SPACE, robots={"r1": (), "r2": ("front",)}, exchange="/fleet")
 # What a start, a parameter or a package that is not there decides.
 LATER = {"tf", "initialpose", "labels"}
 IN_PLACE = {  # by node what robots in its place stand for

@@ -12,9 +12,9 @@ import pytest
 
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_tools.simulation.rendering.render import Rendering, Seen
+from objreg_tools.simulation.rendering.render import Rendering, SeenPixels
 from objreg_tools.simulation.scenarios import RecordingPlan
-from objreg_tools.simulation.truth import FOLDER, FRAMES, MASKS, Truth, TruthWriter, read_truth
+from objreg_tools.simulation.truth import FOLDER, FRAMES, MASKS, SimulationTruth, TruthWriter, read_truth
 from objreg_tools.simulation.world.mesh import Material, box
 from objreg_tools.simulation.world.model import ObjectModel, Symmetry, half_turns, revolution
 from objreg_tools.simulation.world.scene import Placed, Scene
@@ -50,13 +50,13 @@ def rendering(*seen: Placed) -> Rendering:
         T = inverse(T_WORLD_CAMERA) @ o.T_world_object
         xyxy = np.array([3, row, 5, row + 1], np.float32)
         sights.append(
-            Seen(o.instance, o.label, o.is_distractor, xyxy, 2, 0.123456, o.T_world_object, T, o.model.symmetry)
+            SeenPixels(o.instance, o.label, o.is_distractor, xyxy, 2, 0.123456, o.T_world_object, T, o.model.symmetry)
         )
     nothing = np.zeros((12, 16), np.float32)
     return Rendering(nothing, nothing, None, instance, tuple(sights), T_WORLD_CAMERA, CAMERA)
 
 
-def written(recording: Path, plan: RecordingPlan = STORY, *images: Rendering) -> Truth:
+def written(recording: Path, plan: RecordingPlan = STORY, *images: Rendering) -> SimulationTruth:
     """The truth of a story, written and read again; by default of two frames, with the book in both."""
     writer = TruthWriter(plan, "loop", 7, CAMERA)
     for k, image in enumerate(images or (rendering(*BEFORE.objects[:2]), rendering(*AFTER.objects))):

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from objreg_ros.bridge.camera.frames import Edge, FrameTree, Tie, is_world
+from objreg_ros.bridge.camera.frames import FrameEdge, FrameTie, FrameTree, is_world
 from objreg_ros.geometry import rotation_angle
 
 ODOM = re.compile(r"(^|[/_])(odom\w*|init)([/_]|$)", re.IGNORECASE)
@@ -17,7 +17,7 @@ TRAVEL_M = 0.1  # a body goes farther than a joint that turns; a lift may too, b
 LEVEL = 1e-3  # m and rad: of two bases above each other odometry in the plane says the same
 
 
-def odometry_edge(tree: FrameTree, camera: str, outright: bool = False) -> Edge | None:
+def odometry_edge(tree: FrameTree, camera: str, outright: bool = False) -> FrameEdge | None:
     """The edge above a camera that is odometry, as odom → base_link: its parent is called so, or it is the root.
 
     A root without such a name has to be no part of a robot, and its child must have travelled. What moves goes before
@@ -34,7 +34,7 @@ def odometry_edge(tree: FrameTree, camera: str, outright: bool = False) -> Edge 
     return None
 
 
-def truth_edge(tree: FrameTree, camera: str) -> Edge | None:
+def truth_edge(tree: FrameTree, camera: str) -> FrameEdge | None:
     """The edge above a camera that is its ground truth, as world → kinect; None where there is none that moves."""
     edges = (edge for edge in _unfixed(tree, camera) if edge.moves and is_world(edge.parent))
     return next((edge for edge in edges if not ODOM.search(edge.parent) and not is_world(edge.child)), None)
@@ -55,7 +55,7 @@ def body_of(tree: FrameTree, odom_frame: str, camera: str) -> str:
 
 def _hanging(tree: FrameTree, odom_frame: str, camera: str) -> str:
     """The child of the highest moving edge at or below ``odom_frame``, down to the base; the first child if none is."""
-    path: list[Edge] = []
+    path: list[FrameEdge] = []
     for edges in tree.above(camera):
         path.append(next((edge for edge in edges if edge.parent == odom_frame), edges[0]))
         if path[-1].parent == odom_frame:
@@ -77,27 +77,27 @@ def _rank(name: str) -> tuple[int, str]:
 
 def _is_level(tree: FrameTree, a: str, b: str) -> bool:
     """Whether two bases are one straight above the other."""
-    T = tree.between(a, b) if tree.tie(a, b) in (Tie.STATIC, Tie.CONSTANT) else None
+    T = tree.between(a, b) if tree.tie(a, b) in (FrameTie.STATIC, FrameTie.CONSTANT) else None
     return T is not None and max(*abs(T[:2, 3]), rotation_angle(T[:3, :3])) < LEVEL
 
 
-def _unfixed(tree: FrameTree, camera: str) -> list[Edge]:
+def _unfixed(tree: FrameTree, camera: str) -> list[FrameEdge]:
     """The edges above a camera that are on /tf, the lowest first."""
     return [edge for edges in tree.above(camera) for edge in edges if edge.fixed is None]
 
 
-def _is_root(edge: Edge, edges: Iterable[Edge]) -> bool:
+def _is_root(edge: FrameEdge, edges: Iterable[FrameEdge]) -> bool:
     """Whether a frame travels in a root that is no part of a robot."""
     is_highest = all(other.child != edge.parent or is_world(other.parent) for other in edges)
     return is_highest and edge.extent > TRAVEL_M and not BASE.search(edge.parent)
 
 
-def names_of(edge: Edge) -> str:
+def names_of(edge: FrameEdge) -> str:
     """Both frames, for a user."""
     return f"{edge.parent} → {edge.child}"
 
 
-def moved(message: object, edge: Edge) -> Iterator[object]:
+def moved(message: object, edge: FrameEdge) -> Iterator[object]:
     """The transforms of a TFMessage that are of an edge."""
     for one in message.transforms:  # type: ignore[attr-defined]
         if (one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")) == (edge.parent, edge.child):

@@ -46,7 +46,7 @@ class Cameras(NamedTuple):
     awaited: bool = False
 
 
-class Seen(NamedTuple):
+class SeenFrame(NamedTuple):
     """A depth image, the camera_info and lens of the picture that its boxes are in, and what was done to register it.
 
     ``registered`` is empty where depth is as it came.
@@ -71,7 +71,7 @@ def depth_image(
     raw: lenses.Raw = lenses.Raw(),
     most_pixels: int = limits.MOST_PIXELS_OF_PICTURE,
     colour_frame: str = "",
-) -> Seen:
+) -> SeenFrame:
     """Depth with colour, registered to it where it did not come so; as `lenses.depth_image`, to the bit, where it did.
 
     ``colour_frame`` is the frame of the boxes, for where ``colour`` is None. ValueError for a message that breaks its
@@ -88,13 +88,15 @@ def depth_image(
     )
     T_colour_depth = tie.T_colour_depth(find_pose, cameras)
     if T_colour_depth is None or view is None:
-        return Seen(lenses.depth_image(depth_message, cameras.depth, picture, most_pixels, raw), cameras.depth, raw)
+        return SeenFrame(
+            lenses.depth_image(depth_message, cameras.depth, picture, most_pixels, raw), cameras.depth, raw
+        )
     of_colour = lenses.Raw(raw.colour, raw.colour)
     depth = lenses.depth_image(depth_message, cameras.depth, None, most_pixels, lenses.Raw(raw.depth, False))
     lens = lenses.lens_of(cameras.colour, of_colour)
     rgb = None if picture is None else picture.rgb if lens is None else lens.rectify_colour(picture.rgb)
     there = register(depth, T_colour_depth, view if lens is None else lens.camera, rgb, tie.colour)
-    return Seen(there, cameras.colour, of_colour, tie.text(T_colour_depth, there.intrinsics))
+    return SeenFrame(there, cameras.colour, of_colour, tie.text(T_colour_depth, there.intrinsics))
 
 
 def in_optical_frame(cloud: PointCloud, colour_frame: str, find_pose: FindPose) -> PointCloud:

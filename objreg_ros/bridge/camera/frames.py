@@ -37,7 +37,7 @@ WORLD = re.compile(
 )
 
 
-class Tie(IntEnum):
+class FrameTie(IntEnum):
     """How it is known where two frames are on each other; of a chain the largest of its edges'."""
 
     STATIC = 0  # by /tf_static
@@ -49,7 +49,7 @@ Sample = tuple[float, ...]  # x y z qx qy qz qw
 
 
 @dataclass(slots=True)
-class Edge:
+class FrameEdge:
     """A frame in its parent. ``fixed (4, 4)`` is by /tf_static; else ``first`` and the history are by /tf."""
 
     parent: str
@@ -62,11 +62,11 @@ class Edge:
     samples: list[Sample] = field(default_factory=list)
 
     @property
-    def tie(self) -> Tie:
+    def tie(self) -> FrameTie:
         """How the edge is known."""
         if self.fixed is not None:
-            return Tie.STATIC
-        return Tie.MOVING if self.moves else Tie.CONSTANT
+            return FrameTie.STATIC
+        return FrameTie.MOVING if self.moves else FrameTie.CONSTANT
 
     def add(self, stamp_ns: int, sample: Sample) -> None:
         """Another sample. One that is not newer is left out; time that jumps back begins the history anew."""
@@ -120,7 +120,7 @@ class FrameTree:
     """
 
     def __init__(self) -> None:
-        self._edges: dict[str, dict[str, Edge]] = {}
+        self._edges: dict[str, dict[str, FrameEdge]] = {}
         self._count = 0
         self._asked: set[str] = set()
         self._followed: set[str] = set()  # children whose edges have a history
@@ -169,12 +169,12 @@ class FrameTree:
             self._follow()
         edge.add(stamp_ns, sample)
 
-    def _edge(self, parent: str, child: str) -> Edge:
+    def _edge(self, parent: str, child: str) -> FrameEdge:
         parents = self._edges.get(child, {})
         if parent not in parents and self._count >= MOST_FRAMES:
             raise ValueError(f"tf: expected at most {MOST_FRAMES} frames, got another one, {child}")
         if parent not in parents:
-            self._edges.setdefault(child, parents)[parent] = Edge(parent, child)
+            self._edges.setdefault(child, parents)[parent] = FrameEdge(parent, child)
             self._count += 1
         return parents[parent]
 
@@ -192,9 +192,9 @@ class FrameTree:
     def _follow(self) -> None:
         self._followed = {edge.child for name in self._asked for edge in self._chain(name)}
 
-    def _chain(self, name: str) -> list[Edge]:
+    def _chain(self, name: str) -> list[FrameEdge]:
         """The edges above a frame, the lowest first; a ring of frames is gone round once."""
-        chain: list[Edge] = []
+        chain: list[FrameEdge] = []
         passed = {name}
         while name in self._edges and len(chain) < MOST_DEEP:
             edge = min(self._edges[name].values(), key=_preference)
@@ -205,7 +205,7 @@ class FrameTree:
             passed.add(name)
         return chain
 
-    def above(self, name: str) -> list[list[Edge]]:
+    def above(self, name: str) -> list[list[FrameEdge]]:
         """The edges above a frame, the lowest first: of each frame on the chain those to all its parents.
 
         The first of several is the one by which the chain goes on.
@@ -233,20 +233,22 @@ class FrameTree:
             T_top_a, T_top_b = (_product(edges, stamp_ns) for edges in path)
         return None if T_top_a is None or T_top_b is None else inverse(T_top_a) @ T_top_b
 
-    def tie(self, a: str, b: str, without: str = "") -> Tie | None:
+    def tie(self, a: str, b: str, without: str = "") -> FrameTie | None:
         """How it is known where two frames are on each other; None where nothing ties them, as in `between`."""
         with self._lock:
             self._ask((a, b))
             path = self._path(a, b, without)
-            return None if path is None else max((edge.tie for edges in path for edge in edges), default=Tie.STATIC)
+            return (
+                None if path is None else max((edge.tie for edges in path for edge in edges), default=FrameTie.STATIC)
+            )
 
     def reached_ns(self, a: str, b: str) -> int | None:
         """Until when every edge between two frames that moves is known; None where none moves."""
         with self._lock:
-            moving = [edge for edges in self._path(a, b) or () for edge in edges if edge.tie is Tie.MOVING]
+            moving = [edge for edges in self._path(a, b) or () for edge in edges if edge.tie is FrameTie.MOVING]
             return min((edge.stamps_ns[-1] for edge in moving if edge.stamps_ns), default=None)
 
-    def _path(self, a: str, b: str, without: str = "") -> tuple[list[Edge], list[Edge]] | None:
+    def _path(self, a: str, b: str, without: str = "") -> tuple[list[FrameEdge], list[FrameEdge]] | None:
         """The edges above either frame up to the one that both share; None where that takes what carries neither."""
         of_a, of_b = self._chain(a), self._chain(b)
         names_a, names_b = ([name, *(edge.parent for edge in of)] for name, of in ((a, of_a), (b, of_b)))
@@ -258,13 +260,13 @@ class FrameTree:
         return None if any(name == without or is_world(name) for name in between) else (of_a[:up], of_b[:down])
 
 
-def _preference(edge: Edge) -> tuple[bool, bool, bool]:
+def _preference(edge: FrameEdge) -> tuple[bool, bool, bool]:
     """By which of its parents a frame is asked for, the least first; of equals the one that was there first."""
     world = is_world(edge.parent)
     return edge.fixed is None, world, world and "odom" not in edge.parent.lower()
 
 
-def _product(edges: list[Edge], stamp_ns: int | None) -> Array | None:
+def _product(edges: list[FrameEdge], stamp_ns: int | None) -> Array | None:
     T_top_bottom = np.eye(4)
     for edge in edges:
         T_parent_child = edge.at(stamp_ns)

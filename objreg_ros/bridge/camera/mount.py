@@ -9,16 +9,16 @@ from enum import Enum
 from typing import NamedTuple
 
 from objreg_ros.bridge.camera.chains import body_of
-from objreg_ros.bridge.camera.frames import MOST_FRAMES, FrameTree, Tie
+from objreg_ros.bridge.camera.frames import MOST_FRAMES, FrameTie, FrameTree
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import Odometry
 
-WHERE = {Tie.STATIC: "/tf_static has", Tie.CONSTANT: "/tf repeats", Tie.MOVING: "/tf moves"}
+WHERE = {FrameTie.STATIC: "/tf_static has", FrameTie.CONSTANT: "/tf repeats", FrameTie.MOVING: "/tf moves"}
 CAMERAS = re.compile(r"cam(era)?([^a-z]|$)|(^|_)orb(_|$|slam)", re.IGNORECASE)
 BODIES = re.compile(r"(^|_)(robot|base\w*|body|local_position)(_|$)", re.IGNORECASE)
 
 
-class Body(Enum):
+class OdometryBody(Enum):
     """Whose pose an odometry without a child_frame_id is."""
 
     BASE = "base"  # of the robot's base, as the tree of frames has it
@@ -26,15 +26,15 @@ class Body(Enum):
     UNKNOWN = "unknown"
 
 
-def nameless_body(topic: str, has_child: bool) -> Body:
+def nameless_body(topic: str, has_child: bool) -> OdometryBody:
     """Whose pose comes on a topic without a name: of an Odometry (``has_child``) the base's, of a pose what it says."""
     if has_child:
-        return Body.BASE
+        return OdometryBody.BASE
     for part in reversed(topic.split("/")):
-        for body, name in ((Body.BASE, BODIES), (Body.CAMERA, CAMERAS)):
+        for body, name in ((OdometryBody.BASE, BODIES), (OdometryBody.CAMERA, CAMERAS)):
             if name.search(part):
                 return body
-    return Body.UNKNOWN
+    return OdometryBody.UNKNOWN
 
 
 class Seat(Enum):
@@ -67,7 +67,7 @@ class Mount:
         self._tree = FrameTree() if tree is None else tree
         self._said: dict[tuple[str, str], str] = {}
         self._asked = ("", "")  # the body and the camera of the last question
-        self.nameless = Body.BASE
+        self.nameless = OdometryBody.BASE
         self.unknown = False  # whether the last answer was `Seat.UNKNOWN`
 
     def T_body_camera(
@@ -99,9 +99,9 @@ class Mount:
         if not samples:
             return Seated(Seat.ONE_PLACE)
         odom, body = samples[0].frame_id.lstrip("/"), samples[0].child_frame_id.lstrip("/")
-        if not body and camera and self.nameless is Body.BASE:
+        if not body and camera and self.nameless is OdometryBody.BASE:
             body = body_of(self._tree, odom, camera)
-        if body == camera or (not body and self.nameless is Body.CAMERA):
+        if body == camera or (not body and self.nameless is OdometryBody.CAMERA):
             return Seated(Seat.ONE_PLACE)
         self._asked = body, camera
         tie = self._tree.tie(body, camera, odom) if body and camera else None
@@ -113,10 +113,10 @@ class Mount:
             return Seated(Seat.UNKNOWN)
         return self._tied(tie, odom, body, camera, samples[-1].stamp_ns if stamp_ns is None else stamp_ns)
 
-    def _tied(self, tie: Tie, odom: str, body: str, camera: str, stamp_ns: int) -> Seated:
+    def _tied(self, tie: FrameTie, odom: str, body: str, camera: str, stamp_ns: int) -> Seated:
         T = self._tree.between(body, camera, stamp_ns, odom)
         names = f"{WHERE[tie]} {_the('camera', camera)} on {_the('odometry', body)}"
-        if tie is Tie.MOVING:
+        if tie is FrameTie.MOVING:
             self._announce(body, camera, f"{names} by a joint, which is followed")
         elif T is not None:
             self._announce(body, camera, f"{names} at {' '.join(f'{metres:.3f}' for metres in T[:3, 3])} m")

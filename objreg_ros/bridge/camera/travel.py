@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from objreg_ros.bridge.camera.chains import moved, odometry_edge
-from objreg_ros.bridge.camera.frames import Edge, FrameTree
+from objreg_ros.bridge.camera.frames import FrameEdge, FrameTree
 from objreg_ros.bridge.messages import motion_from_msg
 from objreg_ros.data.frames import Odometry
 
@@ -21,7 +21,7 @@ class Travel:
     def __init__(self, tree: FrameTree, outright: bool = False) -> None:
         self.outright, self.camera = outright, ""
         self._tree = tree
-        self._edge: Edge | None = None
+        self._edge: FrameEdge | None = None
         self._of = ""  # the camera that the edge is of
 
     def of(self, message: Any) -> Iterator[Odometry]:

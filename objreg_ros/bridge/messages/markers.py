@@ -26,7 +26,7 @@ GREEN, RED, GOLD, WHITE = (0.2, 0.8, 0.3, 1.0), (0.9, 0.2, 0.2, 0.35), (1.0, 0.7
 Edge = tuple[int, int]
 
 
-class Scene:
+class MarkerScene:
     """Where the camera was at its keyframes, and which of them were joined. Frames without odometry have no place."""
 
     def __init__(self) -> None:

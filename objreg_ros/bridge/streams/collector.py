@@ -31,7 +31,7 @@ RECENT = 100  # detections that wait for their objects
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class LastDetections:
     """One frame as the graph saw it."""
 
     detections: Detections
@@ -47,7 +47,7 @@ class Collector(Node):
         self.rejected: dict[str, int] = {}
         self.closures: list[LoopClosure] = []
         self.refusals: list[Rejected] = []
-        self.sight: Sight | None = None
+        self.sight: LastDetections | None = None
         self.glimpses: dict[int, dict[str, Any]] = {}  # stamp → labels detected, middles of objects
         self._names: Mapping[int, str] = {}
         self._recent: deque[Detections] = deque(maxlen=RECENT)
@@ -115,7 +115,7 @@ class Collector(Node):
             return
         if self.sight is None or len(objects) >= len(self.sight.objects):
             seen = min(self._recent, key=lambda detections: abs(detections.stamp_ns - stamp_ns))
-            self.sight = Sight(seen, objects)
+            self.sight = LastDetections(seen, objects)
 
     def _glimpse(self, stamp_ns: int) -> dict[str, Any]:
         return self.glimpses.setdefault(stamp_ns, {"stamp_ns": stamp_ns, "labels": [], "objects": []})

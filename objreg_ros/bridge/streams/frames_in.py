@@ -16,7 +16,7 @@ from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros.bridge.camera.camera_stream import CameraStream
-from objreg_ros.bridge.camera.mount import Body, Mount, nameless_body
+from objreg_ros.bridge.camera.mount import Mount, OdometryBody, nameless_body
 from objreg_ros.bridge.camera.transforms import is_installed, receive_frames
 from objreg_ros.bridge.camera.travel import Travel
 from objreg_ros.bridge.messages import from_msg, headers, motion_from_msg
@@ -90,7 +90,7 @@ class FramesNode(SynchronisedNode):
         """What numbers are called by a robot, or by the only one there is."""
         return self._names.get(robot) or self._names.get("", {})
 
-    def _on_odom(self, message: Any, body: Body = Body.BASE) -> None:
+    def _on_odom(self, message: Any, body: OdometryBody = OdometryBody.BASE) -> None:
         odometry = self.read_aside("odom", motion_from_msg.odometry, message)
         if odometry is not None:
             self._by_topic, self._mount.nameless = True, body

@@ -39,7 +39,7 @@ LAST_S = 5.0  # how long to wait at the end for depth that is newer than any ima
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class PlayedMessage:
     """One message to publish: where, when it was recorded, and its CDR bytes.
 
     A lossless play follows an image or a depth (``kind``) by the stamp in its header.
@@ -134,7 +134,9 @@ class Player(Node):
 
     # Play
 
-    def play(self, items: Iterable[Item], rate: float | None, on_item: Callable[[Item], None]) -> None:
+    def play(
+        self, items: Iterable[PlayedMessage], rate: float | None, on_item: Callable[[PlayedMessage], None]
+    ) -> None:
         """Publish items in order: at ``rate`` times their own pace, or at once if it is None."""
         start_ns, start = None, 0.0
         for item in items:
@@ -145,7 +147,9 @@ class Player(Node):
             self._publish(item)
             on_item(item)
 
-    def play_lossless(self, items: Iterable[Item], patience: float, on_item: Callable[[Item], None]) -> None:
+    def play_lossless(
+        self, items: Iterable[PlayedMessage], patience: float, on_item: Callable[[PlayedMessage], None]
+    ) -> None:
         """Publish items in order, a frame only when the graph can take it; returns when all are through.
 
         When no acknowledgement comes for ``patience`` seconds, what is in flight goes to ``lost`` and the play goes on.
@@ -199,7 +203,7 @@ class Player(Node):
         while (left := end_s - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
 
-    def _publish(self, item: Item) -> None:
+    def _publish(self, item: PlayedMessage) -> None:
         if self._ticks is not None:
             self._ticks.publish(to_msg.clock(item.stamp_ns))
         self._publishers_of[item.topic].publish(item.cdr)

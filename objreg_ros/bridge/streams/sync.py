@@ -44,7 +44,7 @@ class Drop(Enum):
 
 
 @dataclass(slots=True)
-class Item:
+class QueuedMessage:
     """One stamped item that waits."""
 
     stamp_ns: int
@@ -98,7 +98,7 @@ class Queue:
 
     stream: Stream
     on_drop: Callable[[str, int, str], None]
-    items: deque[Item] = field(default_factory=deque)
+    items: deque[QueuedMessage] = field(default_factory=deque)
     last_ns: int | None = None
     period_ns: int | None = None  # between its last two
     latched: Any = None
@@ -108,7 +108,9 @@ class Queue:
     clock: ClockMonitor[Any] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.clock = ClockMonitor(lambda stamp_ns, payload: self._let_go(Item(stamp_ns, payload), Drop.ODD_STAMP))
+        self.clock = ClockMonitor(
+            lambda stamp_ns, payload: self._let_go(QueuedMessage(stamp_ns, payload), Drop.ODD_STAMP)
+        )
 
     @property
     def crowded(self) -> bool:
@@ -124,12 +126,12 @@ class Queue:
         """Items that no match has used yet."""
         return sum(not item.used for item in self.items) + self.clock.holding
 
-    def nearest(self, stamp_ns: int) -> Item | None:
+    def nearest(self, stamp_ns: int) -> QueuedMessage | None:
         """The item nearest to a time within the slop; None if there is none. The earlier of two that are as near."""
         near = min(self.items, key=lambda item: abs(item.stamp_ns - stamp_ns), default=None)
         return near if near is not None and abs(near.stamp_ns - stamp_ns) <= self.stream.slop_ns else None
 
-    def partners(self, stamp_ns: int) -> tuple[Item, ...]:
+    def partners(self, stamp_ns: int) -> tuple[QueuedMessage, ...]:
         """What goes with a time, the earlier first; one item at most, or two that enclose it. Empty for none."""
         near = self.nearest(stamp_ns)
         if self.stream.enclosing and (near is None or near.stamp_ns != stamp_ns):
@@ -152,11 +154,11 @@ class Queue:
             return self.stream.need is Need.OPTIONAL and not self.stream.expected
         return self.last_ns > stamp_ns or any(item.stamp_ns == stamp_ns for item in self.items)
 
-    def takes(self, stamp_ns: int, item: Item) -> bool:
+    def takes(self, stamp_ns: int, item: QueuedMessage) -> bool:
         """Whether an item of the reference at a time would have this one for its match, and no other may."""
         return self.stream.need is Need.REQUIRED and self.nearest(stamp_ns) is item
 
-    def receive(self, item: Item) -> None:
+    def receive(self, item: QueuedMessage) -> None:
         """Take an item in."""
         self.period_ns = None if self.last_ns is None else item.stamp_ns - self.last_ns
         self.last_ns = item.stamp_ns
@@ -168,9 +170,9 @@ class Queue:
 
     def refuse(self, stamp_ns: int) -> None:
         """Count an item that came late."""
-        self._let_go(Item(stamp_ns, None), Drop.LATE)
+        self._let_go(QueuedMessage(stamp_ns, None), Drop.LATE)
 
-    def use(self, item: Item) -> None:
+    def use(self, item: QueuedMessage) -> None:
         """Count an item as matched, once."""
         self.matched += not item.used
         item.used = True
@@ -193,7 +195,7 @@ class Queue:
             if item.stamp_ns > stamp_ns:
                 self._let_go(item, Drop.TIME_JUMP)
 
-    def _let_go(self, item: Item, why: Drop) -> None:
+    def _let_go(self, item: QueuedMessage, why: Drop) -> None:
         if not item.used:
             self.dropped[why.value] += 1
             self.on_drop(self.stream.name, item.stamp_ns, why.value)
@@ -234,7 +236,7 @@ class Synchroniser:
         if queue.last_ns is not None and stamp_ns < queue.last_ns:
             self._forget_after(stamp_ns)
         queue.drop_after(stamp_ns)  # another stream's jump may have left what lies in the future of this one's
-        queue.receive(Item(stamp_ns, payload))
+        queue.receive(QueuedMessage(stamp_ns, payload))
         return [*self._matches(), *self._make_space(queue)]
 
     def believe(self, passed_ns: int) -> list[Match]:
@@ -288,7 +290,7 @@ class Synchroniser:
             found += self._resolve(self._reference.items[0])
         return found
 
-    def _decided(self, item: Item) -> bool:
+    def _decided(self, item: QueuedMessage) -> bool:
         """Whether the fate of a reference item is known: waiting longer would change nothing."""
         for queue in self._others:
             if queue.stream.need is Need.LATCHED:
@@ -298,7 +300,7 @@ class Synchroniser:
                 return False
         return not self._may_give_way(item)
 
-    def _may_give_way(self, item: Item) -> bool:
+    def _may_give_way(self, item: QueuedMessage) -> bool:
         """Whether the next reference item is nearer to a partner, and is only due or may meet a nearer one yet."""
         items, period_ns = self._reference.items, self._reference.period_ns
         if len(items) > 1:
@@ -310,7 +312,7 @@ class Synchroniser:
         due_ns = item.stamp_ns + (period_ns or 0)
         return any(_is_nearer(due_ns, item, partner) for _, partner in self._sole_partners(item))
 
-    def _gives_way(self, item: Item) -> bool:
+    def _gives_way(self, item: QueuedMessage) -> bool:
         """Whether the next reference item is nearer to a partner that serves one match, and will have it."""
         if len(self._reference.items) < 2:
             return False
@@ -320,7 +322,7 @@ class Synchroniser:
             for queue, partner in self._sole_partners(item)
         )
 
-    def _sole_partners(self, item: Item) -> list[tuple[Queue, Item]]:
+    def _sole_partners(self, item: QueuedMessage) -> list[tuple[Queue, QueuedMessage]]:
         """What the streams whose items serve one match have for a reference item."""
         queues = [queue for queue in self._others if queue.stream.need is Need.REQUIRED]
         return [(queue, partner) for queue in queues for partner in queue.partners(item.stamp_ns)]
@@ -331,7 +333,7 @@ class Synchroniser:
         stopped = now_ns is not None and last_ns is not None and now_ns - last_ns > SILENCE_NS
         return stopped and queue.stream.need is Need.OPTIONAL
 
-    def _resolve(self, item: Item, why: Drop = Drop.UNMATCHED) -> list[Match]:
+    def _resolve(self, item: QueuedMessage, why: Drop = Drop.UNMATCHED) -> list[Match]:
         """Take the first reference item out: a match, or a drop."""
         partners = {queue.stream.name: queue.partners(item.stamp_ns) for queue in self._others if not _latched(queue)}
         if self.lacking(item.stamp_ns) or self._gives_way(item):
@@ -346,7 +348,7 @@ class Synchroniser:
         return [Match(item.stamp_ns, {self._reference.stream.name: item.payload, **payloads})]
 
     @staticmethod
-    def _spend(queue: Queue, partners: Sequence[Item]) -> None:
+    def _spend(queue: Queue, partners: Sequence[QueuedMessage]) -> None:
         for partner in partners:
             queue.use(partner)
         if partners:
@@ -369,7 +371,7 @@ def _latched(queue: Queue) -> bool:
     return queue.stream.need is Need.LATCHED
 
 
-def _is_nearer(stamp_ns: int, item: Item, partner: Item) -> bool:
+def _is_nearer(stamp_ns: int, item: QueuedMessage, partner: QueuedMessage) -> bool:
     """Whether a time is nearer to a partner than an item is."""
     return abs(stamp_ns - partner.stamp_ns) < abs(item.stamp_ns - partner.stamp_ns)
 
@@ -379,7 +381,7 @@ def _size(payload: Any) -> int:
     return len(getattr(payload, "data", ()))
 
 
-def _payload(stream: Stream, partners: Sequence[Item]) -> Any:
+def _payload(stream: Stream, partners: Sequence[QueuedMessage]) -> Any:
     if not partners:
         return None
     return tuple(item.payload for item in partners) if stream.enclosing else partners[0].payload

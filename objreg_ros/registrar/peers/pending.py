@@ -20,7 +20,7 @@ APART_M = 0.2  # between an object of a summary and of its keyframe, which has f
 Moment = tuple[Name, int, int, str]  # of a keyframe: name, stamp, session and camera
 
 
-class Asked(NamedTuple):
+class KeyframeRequest(NamedTuple):
     """A keyframe that we asked for, and what it is to be compared with."""
 
     summary: Summary
@@ -47,12 +47,12 @@ class Pending:
 
     def __init__(self, counters: Counter[str]) -> None:
         self._counters = counters
-        self._asked: dict[tuple[Moment, bytes], Asked] = {}  # by keyframe and objects, the oldest first
+        self._asked: dict[tuple[Moment, bytes], KeyframeRequest] = {}  # by keyframe and objects, the oldest first
 
     def __contains__(self, name: object) -> bool:
         return any(moment[0] == name for moment, _ in self._asked)
 
-    def add(self, asked: Asked) -> bool:
+    def add(self, asked: KeyframeRequest) -> bool:
         """Whether it may wait: of too many the newest of the run that has most does not."""
         for key in [k for k, one in self._asked.items() if asked.since - one.since > ASKED_S]:
             self._drop(key)
@@ -66,12 +66,12 @@ class Pending:
         self._asked[asked.key] = asked
         return True
 
-    def find(self, name: Name, stamp_ns: int, session: int, frame_id: str) -> list[Asked]:
+    def find(self, name: Name, stamp_ns: int, session: int, frame_id: str) -> list[KeyframeRequest]:
         """What an answer may be the answer to: several where summaries of one name differ, as a forged one does."""
         wanted = name, stamp_ns, session, frame_id
         return [asked for (moment, _), asked in self._asked.items() if moment == wanted]
 
-    def forget(self, asked: Asked) -> None:
+    def forget(self, asked: KeyframeRequest) -> None:
         """Its answer came, and was the right one."""
         self._asked.pop(asked.key, None)
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.registration.kernels.closest_points import Surface
+from objreg_ros.registration.kernels.closest_points import IndexedSurface
 from objreg_ros.registration.refine.batch_icp import REACHES_M, pair
 from objreg_ros.sensor import DEPTH_WARP, depth_sigma
 
@@ -26,7 +26,7 @@ Noises = tuple[float, float]
 KINECTS: Noises = (1.0, 1.0)  # how noisy the depth of two cameras is, in that of a Kinect
 
 
-def information(xyz: Array, normals: Array, surface: Surface, T: Array, noises: Noises = KINECTS) -> Array:
+def information(xyz: Array, normals: Array, surface: IndexedSurface, T: Array, noises: Noises = KINECTS) -> Array:
     """The information (6, 6) of a left step [t r] of a pose (4, 4), of points (M, 3) on a surface.
 
     ``noises`` are the `depth_noise` of the camera of the points and of that of the surface. Next to zero along
@@ -43,7 +43,7 @@ def information(xyz: Array, normals: Array, surface: Surface, T: Array, noises: 
 
 
 def systematic_depth_error_of_step(
-    xyz: Array, normals: Array, surface: Surface, T: Array, noises: Noises = KINECTS
+    xyz: Array, normals: Array, surface: IndexedSurface, T: Array, noises: Noises = KINECTS
 ) -> Array:
     """The covariance (6, 6) of a left step [t r] of a pose (4, 4) that wrong depths make, on top of `information`.
 
@@ -58,7 +58,7 @@ def systematic_depth_error_of_step(
 
 
 def _weighed(
-    xyz: Array, normals: Array, surface: Surface, T: Array, noises: Noises
+    xyz: Array, normals: Array, surface: IndexedSurface, T: Array, noises: Noises
 ) -> tuple[Array, Array, Array, Array]:
     """Per pair: where it is (3, n), the Jacobian (6, n) of a left step, the residual m, the weight over the noise."""
     index, at, J, residual, weight = pair(xyz, normals, *surface.grid, T, REACHES_M[-1])

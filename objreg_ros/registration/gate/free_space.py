@@ -16,7 +16,7 @@ from objreg_ros.registration.candidate import KeypointAgreement
 from objreg_ros.registration.gate.refusal import Refusal
 
 
-class Limits(NamedTuple):
+class FreeSpaceLimits(NamedTuple):
     """The largest shares of the tested pixels, and the keypoints with which certain violations are only weighed."""
 
     violations: float = 0.15  # fast turns and lenses make right poses violate by up to this
@@ -25,11 +25,11 @@ class Limits(NamedTuple):
     lead: int = 2  # cells more than any other pose
 
 
-LIMITS = Limits()
+LIMITS = FreeSpaceLimits()
 
 
 def check(
-    violations: float, certain: float, keypoints: KeypointAgreement | None = None, limits: Limits = LIMITS
+    violations: float, certain: float, keypoints: KeypointAgreement | None = None, limits: FreeSpaceLimits = LIMITS
 ) -> Refusal | None:
     """Refuse a pose with more violations, or certain ones, than any other evidence makes up for."""
     if violations > limits.violations:
@@ -39,7 +39,7 @@ def check(
     return None
 
 
-def _is_held(keypoints: KeypointAgreement | None, limits: Limits) -> bool:
+def _is_held(keypoints: KeypointAgreement | None, limits: FreeSpaceLimits) -> bool:
     """Whether keypoints all over the pictures agree with a pose, and with no other one nearly as many."""
     if keypoints is None:
         return False

@@ -16,8 +16,8 @@ class Limits(NamedTuple):
     translation_m: float = odometry.FAR_M
     gravity_sigmas: float = gravity.SIGMAS
     unnamed: int = objects.LEAST_UNNAMED
-    free_space: free_space.Limits = free_space.LIMITS
-    surroundings: surroundings.Limits = surroundings.LIMITS
+    free_space: free_space.FreeSpaceLimits = free_space.LIMITS
+    surroundings: surroundings.SurroundingsLimits = surroundings.LIMITS
     score_margin: float = competing.LEAST_MARGIN
     odometry_sigmas: float = odometry.SIGMAS
 

@@ -16,7 +16,7 @@ from objreg_ros.registration.candidate import Verification
 from objreg_ros.registration.gate.refusal import Refusal
 
 
-class Limits(NamedTuple):
+class SurroundingsLimits(NamedTuple):
     """What is asked of the surroundings."""
 
     tested: int = 600  # least number of pixels of both views that land in the other one
@@ -25,11 +25,15 @@ class Limits(NamedTuple):
     score: float = 0.25  # least view score around a lone object: five of five false ones had less, 45 of 321 right ones
 
 
-LIMITS = Limits()
+LIMITS = SurroundingsLimits()
 
 
 def check(
-    around: Verification | None, whole: Verification, labels: Iterable[str], lone: bool, limits: Limits = LIMITS
+    around: Verification | None,
+    whole: Verification,
+    labels: Iterable[str],
+    lone: bool,
+    limits: SurroundingsLimits = LIMITS,
 ) -> Refusal | None:
     """Refuse a pose that its surroundings do not confirm; ``labels`` are those of the matched objects.
 
@@ -50,7 +54,7 @@ def _check_score(score: float, least: float) -> Refusal | None:
     return None if score >= least else (Reason.LOW_OVERLAP, f"view score {score:.2f} < {least:.2f}")
 
 
-def _check_overlap(around: Verification, limits: Limits) -> Refusal | None:
+def _check_overlap(around: Verification, limits: SurroundingsLimits) -> Refusal | None:
     if around.tested < limits.tested:
         return Reason.LOW_OVERLAP, f"{around.tested} pixels tested < {limits.tested}"
     if around.inliers < limits.inliers:

@@ -15,7 +15,7 @@ MOST_CELLS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Surface:
+class IndexedSurface:
     """Oriented points (N, 3) float32 with a grid that holds, in each cell, which of them is closest (-1: none near)."""
 
     xyz: Array
@@ -33,19 +33,19 @@ class Surface:
         return self.xyz, self.normals, self.closest, self.low, self.cell
 
 
-def prepare_surface(xyz: Array, normals: Array, cell: float, reach: float) -> Surface:
+def prepare_surface(xyz: Array, normals: Array, cell: float, reach: float) -> IndexedSurface:
     """A surface whose grid knows the closest point out to ``reach`` m; ``cell`` m grows for a very large cloud."""
     usable = np.abs(normals).sum(axis=1) > 0.5
     xyz, normals = np.ascontiguousarray(xyz[usable], np.float32), np.ascontiguousarray(normals[usable], np.float32)
     if len(xyz) == 0:
         nothing = np.full((1, 1, 1), -1, np.int32)
-        return Surface(xyz=xyz, normals=normals, closest=nothing, low=np.zeros(3, np.float32), cell=cell)
+        return IndexedSurface(xyz=xyz, normals=normals, closest=nothing, low=np.zeros(3, np.float32), cell=cell)
     low, size = xyz.min(axis=0) - reach, np.ptp(xyz, axis=0) + 2.0 * reach
     while np.prod(size / cell + 1.0) > MOST_CELLS:
         cell *= 1.25
     shape = np.ceil(size / cell).astype(np.int64) + 1
     closest = _closest(xyz, low, np.float32(cell), shape, np.float32(reach))
-    return Surface(xyz=xyz, normals=normals, closest=closest, low=low, cell=cell)
+    return IndexedSurface(xyz=xyz, normals=normals, closest=closest, low=low, cell=cell)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)

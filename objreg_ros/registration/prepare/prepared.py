@@ -13,7 +13,7 @@ from typing import TypeVar, overload
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
+from objreg_ros.registration.kernels.closest_points import IndexedSurface, prepare_surface
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrationParams
@@ -84,7 +84,7 @@ class Prepared:
     sight: Sight
     halves: Sequence[Sight]
     pictures: Sequence[Keypoints]
-    surface: Surface
+    surface: IndexedSurface
     features: Features
     xyz: Array
     normals: Array

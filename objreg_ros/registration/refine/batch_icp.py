@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.registration.kernels.closest_points import Surface
+from objreg_ros.registration.kernels.closest_points import IndexedSurface
 from objreg_ros.registration.kernels.least_squares import add_normal_equations, move, solve
 from objreg_ros.registration.kernels.projection import FAST, INDEX, moved
 from objreg_ros.registration.prepare.prepared import Prepared
@@ -26,7 +26,7 @@ FACING = 0.6  # cosine between the normals of a pair, at least
 
 
 def align(
-    xyz: Array, normals: Array, surface: Surface, T: Array, reach: float, last_reach: float, iterations: int
+    xyz: Array, normals: Array, surface: IndexedSurface, T: Array, reach: float, last_reach: float, iterations: int
 ) -> tuple[Array, Array, Array]:
     """Bring many poses (K, 4, 4) of oriented points (M, 3) to the surface, each to its own basin.
 
@@ -49,7 +49,7 @@ class Fit(NamedTuple):
     extent: float
 
 
-def fit(xyz: Array, normals: Array, surface: Surface, T: Array, reach: float) -> Fit:
+def fit(xyz: Array, normals: Array, surface: IndexedSurface, T: Array, reach: float) -> Fit:
     """The fit of one pose (4, 4): what of the points (M, 3) has a partner within ``reach`` m."""
     H, g = np.zeros((6, 6)), np.zeros(6)
     count, weight, squared, spread = normal_equations(xyz, normals, *surface.grid, T, reach, H, g)

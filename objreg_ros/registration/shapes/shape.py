@@ -15,7 +15,7 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import PointFlag
 from objreg_ros.geometry import pose
-from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
+from objreg_ros.registration.kernels.closest_points import IndexedSurface, prepare_surface
 from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.shapes.silhouette import Silhouette, draw
@@ -60,7 +60,7 @@ class Shape:
         return self.R_upright_camera.T @ self.origin
 
     @cached_property
-    def surface(self) -> Surface:
+    def surface(self) -> IndexedSurface:
         """What other shapes are laid upon: twice as many points, and the grid that knows the closest."""
         dense = slice(2 * self.most)
         return prepare_surface(self.xyz[dense], self.normals[dense], *_cells(self.xyz))

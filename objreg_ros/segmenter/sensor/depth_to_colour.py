@@ -46,7 +46,7 @@ MATCHED = 1.5  # noise of depth in a Kinect's: simulated and real Kinects have 0
 SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
 
-class Offset(NamedTuple):
+class DepthOffset(NamedTuple):
     """How depth is turned against colour in a frame, ``rotation (3,)`` rad; ``shown`` if the frame itself shows it."""
 
     rotation: Array
@@ -92,7 +92,7 @@ class DepthToColour:
         rotation = self.offset(image).rotation
         return image if np.abs(rotation).max() < SMALLEST else turned(image, rotation)
 
-    def offset(self, image: DepthImage) -> Offset:
+    def offset(self, image: DepthImage) -> DepthOffset:
         """The offset of a frame, by its edges and by the frames before; those alone where it has few edges."""
         camera = image.frame_id, image.depth.shape, _reduced(image.intrinsics, 1)
         if self._camera not in (None, camera):
@@ -100,12 +100,12 @@ class DepthToColour:
         self._camera = camera
         self.found = found = find_rotation(image, self.mean, self.spread)
         if found is None:
-            return Offset(self.mean.copy(), False)
+            return DepthOffset(self.mean.copy(), False)
         self._remember(found)
         share = (
             1.0 - NOISE**2 / self.spread**2
         )  # of the measured offset that is no noise: frames that agree differ by it alone
-        return Offset(self.mean + share * (found - self.mean), True)
+        return DepthOffset(self.mean + share * (found - self.mean), True)
 
     def _remember(self, rotation: Array) -> None:
         """Take a frame in: exponential means of the offset and of its square, the first guess weighs `FIRST_FRAMES`."""

@@ -49,7 +49,7 @@ class Lag(NamedTuple):
         return f"{self.ms:.0f} +- {self.sigma_ms:.0f} ms"
 
 
-class Turn(NamedTuple):
+class TurnSample(NamedTuple):
     """By what depth is turned against colour, ``offset (2,)`` rad about x and y, as the camera turns by
     ``velocity (2,)`` rad/s; ``seconds`` of the stream's clock."""
 
@@ -104,7 +104,7 @@ class SensorEstimate:
 
     depth_to_colour: DepthToColour = field(default_factory=DepthToColour)
     _motion: PictureMotion = field(default_factory=PictureMotion)
-    _turns: deque[Turn] = field(default_factory=lambda: deque(maxlen=TURNS))
+    _turns: deque[TurnSample] = field(default_factory=lambda: deque(maxlen=TURNS))
     _noises: deque[float] = field(default_factory=lambda: deque(maxlen=NOISES))
     _seen: int = 0
     _camera: tuple[str, tuple[int, ...]] | None = None
@@ -151,7 +151,7 @@ class SensorEstimate:
         """Put the offset of the frame before beside its velocity, which is known with this frame."""
         velocity, found = self._motion.see(image), self.depth_to_colour.found
         if velocity is not None and self._waiting is not None:
-            self._turns.append(Turn(self._waiting[0], velocity, self._waiting[1]))
+            self._turns.append(TurnSample(self._waiting[0], velocity, self._waiting[1]))
         self._waiting = None if found is None else (1e-9 * image.stamp_ns, found[:2])
 
     def _measure_noise(self, image: DepthImage) -> None:
@@ -171,7 +171,7 @@ class SensorEstimate:
         return None if found is None or found.sigma_ms > MOST_SIGMA_MS else found
 
 
-def fit_lag(turns: list[Turn]) -> Lag | None:
+def fit_lag(turns: list[TurnSample]) -> Lag | None:
     """The lag, by least squares of the offsets over the velocities with a constant for each axis.
 
     None of too few of them, and of a camera that hardly turns.

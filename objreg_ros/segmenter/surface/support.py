@@ -39,7 +39,7 @@ class Plane:
 
 
 @dataclass(frozen=True, slots=True)
-class Support:
+class SupportPlane:
     """One level plane: ``parts (h, w) int32`` numbers its connected parts from 1 on the grid it was found on, 0 is
     elsewhere; ``total`` counts the cells of each number; ``area`` in m²."""
 
@@ -57,14 +57,14 @@ class Ground:
 
     up: Array | None
     confidence: float
-    supports: list[Support]
+    supports: list[SupportPlane]
     surface: Surface
     coarse: Surface
 
 
 def find_supports(
     surface: Surface, camera: Intrinsics, up: Array, min_area: float, jump: tuple[float, float]
-) -> list[Support]:
+) -> list[SupportPlane]:
     """The level surfaces of a frame, largest first; ``up (3,)`` in the camera frame, ``jump`` as in `connect`.
 
     Heights along ``up`` vote in bins with the area that each cell covers; each peak is fitted by least squares.
@@ -73,7 +73,7 @@ def find_supports(
     grid = (surface.depth, surface.normals, surface.x, surface.y)
     pixel = np.float32(surface.step**2 / (camera.fx * camera.fy))
     low, high = _survey(*grid, up.astype(np.float32), pixel, height, area)
-    supports: list[Support] = []
+    supports: list[SupportPlane] = []
     for _ in range(2 * MAX_SUPPORTS):
         peak, votes, count = _commonest(height, area, low, high)
         if votes < LEAST_PEAK * min_area or count < MIN_CELLS or len(supports) == MAX_SUPPORTS:
@@ -87,7 +87,7 @@ def find_supports(
         if size < min_area:
             break
         parts, _ = connect(surface.depth, cells, jump)
-        supports.append(Support(plane, parts, np.bincount(parts.ravel()), size))
+        supports.append(SupportPlane(plane, parts, np.bincount(parts.ravel()), size))
     return supports
 
 

@@ -17,7 +17,7 @@ from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import FIRST_TIME, NOTHING, options
 from objreg_tools.cli.batch_work import BatchWork
 from objreg_tools.cli.paths import OutputPath, RecordingPath
-from objreg_tools.cli.recorded import Asked
+from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import print_ignored
 from objreg_tools.cli.verbosity import aside
 from objreg_tools.report.batch.batch_page import batch_page, totals
@@ -55,7 +55,7 @@ def command(recordings: tuple[Path, ...], out: Path, workers: int | None, schedu
     if scheduler and workers is not None:
         raise click.UsageError("expected --workers or --scheduler, got both; a cluster has the workers that it has")
     require_dask(), require_pyarrow()
-    asked = Asked.of(**{**given, "changes": (*ONE_THREAD, *given["changes"])})
+    asked = RecordedOptions.of(**{**given, "changes": (*ONE_THREAD, *given["changes"])})
     _require_own_memory(asked)
     print_ignored(asked.settings)
     out.mkdir(parents=True, exist_ok=True)
@@ -65,7 +65,7 @@ def command(recordings: tuple[Path, ...], out: Path, workers: int | None, schedu
     return NOTHING if any(row.error or not row.frames for row in rows) else 0
 
 
-def _require_own_memory(asked: Asked) -> None:
+def _require_own_memory(asked: RecordedOptions) -> None:
     if asked.settings.of("registrar", RegistrarParams).store:
         raise ValueError("registrar.store: expected none, since each recording has its own memory; leave it out")
 

@@ -48,7 +48,7 @@ SIMULATED = {"registrar.covariance_calibration": "0.01", "detector.model": share
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class DemoOptions:
     """The command line."""
 
     recording: Path | None
@@ -89,10 +89,10 @@ def command(**asked: Any) -> int:
     of --out. The inputs of a recording that is no rosbag2 are written as one first. The last lines report whether it
     worked, how well, and what to do next. Ends with 3 if no frame got through.
     """
-    return run(Asked(**asked))
+    return run(DemoOptions(**asked))
 
 
-def run(asked: Asked) -> int:
+def run(asked: DemoOptions) -> int:
     """The whole demo and its exit code; ValueError or OSError if it cannot be, or if the counters do not balance."""
     own = asked.recording is not None
     asked = asked if asked.recording else calibrated(asked)
@@ -123,7 +123,7 @@ def run(asked: Asked) -> int:
     return exit_code(summary)
 
 
-def begun_summary(asked: Asked, recording: Path, source: Recording, inputs: Inputs) -> dict[str, Any]:
+def begun_summary(asked: DemoOptions, recording: Path, source: Recording, inputs: Inputs) -> dict[str, Any]:
     """The fields of the JSON on the recording, of which ``source`` was played, and on how the run was made."""
     changed = read_settings(asked.params_file, asked.changes).changed()
     return {
@@ -137,7 +137,7 @@ def begun_summary(asked: Asked, recording: Path, source: Recording, inputs: Inpu
     }
 
 
-def calibrated(asked: Asked) -> Asked:
+def calibrated(asked: DemoOptions) -> DemoOptions:
     """The options for a simulated room: the settings that hold in simulation, unless others are given."""
     if asked.params_file is not None:
         return asked
@@ -146,7 +146,7 @@ def calibrated(asked: Asked) -> Asked:
     return replace(asked, changes=(*known, *asked.changes))
 
 
-def _inputs(recording: Path, asked: Asked) -> Inputs:
+def _inputs(recording: Path, asked: DemoOptions) -> Inputs:
     settings = read_settings(asked.params_file, asked.changes)
     print_ignored(settings)
     depth_source = settings.of("segmenter", SegmenterNodeParams).source
@@ -168,7 +168,7 @@ def _say(text: str) -> None:
     click.echo(text, err=True)
 
 
-def setup_of(asked: Asked, inputs: Inputs, camera: str = "") -> Setup:
+def setup_of(asked: DemoOptions, inputs: Inputs, camera: str = "") -> Setup:
     """The arguments of the nodes and of the player, which plays just these inputs, with the ``camera`` if given."""
     everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
     node_args = {node: list(everywhere) for node in STAGES}
@@ -206,7 +206,7 @@ def _sent(source: Recording, inputs: Inputs, seconds: float | None, live: Live) 
     }
 
 
-def mounting_of(asked: Asked) -> tuple[float, ...]:
+def mounting_of(asked: DemoOptions) -> tuple[float, ...]:
     """The registrar's ``T_base_camera``: x y z qx qy qz qw, or nothing."""
     return read_settings(asked.params_file, asked.changes).of("registrar", RegistrarNodeParams).T_base_camera
 
@@ -219,13 +219,13 @@ def _mounting_by_tf(source: Recording, inputs: Inputs) -> tuple[float, ...]:
     return () if T is None else (*T[:3, 3].tolist(), *map(float, quaternion_from_rotation(T[:3, :3])))
 
 
-def camera_asked(asked: Asked) -> str:
+def camera_asked(asked: DemoOptions) -> str:
     """The camera that is given, by its option or by the segmenter's parameter; empty where none is."""
     by_parameter = read_settings(asked.params_file, asked.changes).of("segmenter", SegmenterNodeParams).camera
     return asked.camera or by_parameter
 
 
-def model_of(asked: Asked) -> str:
+def model_of(asked: DemoOptions) -> str:
     """The detector's model, by its option or by its parameter."""
     return asked.model or read_settings(asked.params_file, asked.changes).of("detector", DetectorParams).model
 

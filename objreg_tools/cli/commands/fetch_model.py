@@ -26,7 +26,7 @@ MIRRORS = (
 
 
 @dataclass(frozen=True)
-class Source:
+class ModelSource:
     """A file that several places offer: its name here, its SHA-256 where it is known, the labels it needs."""
 
     file: str
@@ -35,8 +35,8 @@ class Source:
     labels: str = ""
 
 
-def _of_zoo(file: str, sha256: str) -> Source:
-    return Source(file, tuple(f"{mirror}/{file}" for mirror in MIRRORS), sha256, "models/coco.txt")
+def _of_zoo(file: str, sha256: str) -> ModelSource:
+    return ModelSource(file, tuple(f"{mirror}/{file}" for mirror in MIRRORS), sha256, "models/coco.txt")
 
 
 MODELS = {
@@ -70,7 +70,7 @@ def command(what: str, sha256: str, folder: Path | None) -> None:
     click.echo(f"use it with: --model {path.name}" if folder is None else f"use it with: --model {path}")
 
 
-def find_source(what: str, sha256: str = "") -> Source:
+def find_source(what: str, sha256: str = "") -> ModelSource:
     """The source of a name or a URL; ValueError when it is neither."""
     if what in MODELS:
         return MODELS[what]
@@ -83,10 +83,10 @@ def find_source(what: str, sha256: str = "") -> Source:
             f"model: expected https, or --sha256 with the checksum of the file, got {what!r} without one: "
             "over http anybody on the way can change the file; ask its maker for the checksum"
         )
-    return Source(file, (what,), sha256.lower())
+    return ModelSource(file, (what,), sha256.lower())
 
 
-def fetch(source: Source, path: Path) -> None:
+def fetch(source: ModelSource, path: Path) -> None:
     """Download ``source`` to ``path``, which is only written complete, with the right checksum and loadable.
 
     ValueError when no place has it, or when it is something else; what has arrived of it stays for the next time.
@@ -116,7 +116,7 @@ def checksum(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _accept(part: Path, source: Source) -> None:
+def _accept(part: Path, source: ModelSource) -> None:
     """ValueError, and the file is gone, when it is not what was asked for."""
     got = checksum(part)
     try:

@@ -15,7 +15,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_tools.cli import FIRST_TIME, options
 from objreg_tools.cli.outputs import Outputs
 from objreg_tools.cli.paths import STANDARD_OUTPUT, OutputPath
-from objreg_tools.cli.recorded import Asked, Opened
+from objreg_tools.cli.recorded import Opened, RecordedOptions
 from objreg_tools.cli.run_output import (
     exit_code,
     json_to,
@@ -66,7 +66,7 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
 
     Reports where the run stopped if no loop was closed. Ends with 3 if no frame got through.
     """
-    asked = Asked.of(**{name: given.pop(name) for name in options.OF_RUN})
+    asked = RecordedOptions.of(**{name: given.pop(name) for name in options.OF_RUN})
     outputs = Outputs.of(**given)
     print_ignored(asked.settings)
     with asked.opened(recording) as opened, TemporaryDirectory() as folder, json_to(json_file) as write_json:

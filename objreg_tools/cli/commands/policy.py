@@ -25,7 +25,7 @@ REMARK = " Made by `objreg policy`: who may write, read, serve and call what. Al
 
 
 @dataclass(frozen=True)
-class Asked:
+class PolicyOptions:
     """The graph that a policy is for; ``namespace`` begins with a slash."""
 
     namespace: str = "/"
@@ -43,9 +43,9 @@ class Asked:
 
 
 FILES = {
-    "config/sros2/objreg.policy.xml": Asked(),
-    "config/sros2/robot1.policy.xml": Asked("/robot1", exchange="/fleet", enclaves="/robot1"),
-    "config/sros2/fleet.policy.xml": Asked(robots={"robot1": (), "robot2": ()}),
+    "config/sros2/objreg.policy.xml": PolicyOptions(),
+    "config/sros2/robot1.policy.xml": PolicyOptions("/robot1", exchange="/fleet", enclaves="/robot1"),
+    "config/sros2/fleet.policy.xml": PolicyOptions(robots={"robot1": (), "robot2": ()}),
 }
 
 
@@ -76,7 +76,7 @@ def command(
         return
     robots = RegistrarNodeParams(robots=robot).cameras
     at = f"/{namespace.strip('/')}"
-    click.echo(policy_text(Asked(at, _rules(remap), robots, exchange, source, enclaves)), nl=False)
+    click.echo(policy_text(PolicyOptions(at, _rules(remap), robots, exchange, source, enclaves)), nl=False)
 
 
 def _rules(remap: Iterable[str]) -> dict[str, str]:
@@ -99,7 +99,7 @@ def write_files(repository: Path) -> list[Path]:
     return list(files)
 
 
-def policy_text(asked: Asked) -> str:
+def policy_text(asked: PolicyOptions) -> str:
     """The policy as XML: an enclave for each node, for all in one process, for the sources and the operator."""
     policy = Element("policy", version=VERSION)
     enclaves = SubElement(policy, "enclaves")
@@ -112,7 +112,7 @@ def policy_text(asked: Asked) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n<!--{REMARK}-->\n{ElementTree.tostring(policy, "unicode")}\n'
 
 
-def enclaves_of(asked: Asked) -> dict[str, dict[str, Access]]:
+def enclaves_of(asked: PolicyOptions) -> dict[str, dict[str, Access]]:
     """What each node of each enclave may do. Names are those that the nodes give, behind remaps."""
     nodes = asked.nodes()
     sources = access.of_sources(access.NODES[name] for name in access.STAGES).renamed(asked.remaps)
@@ -124,7 +124,7 @@ def enclaves_of(asked: Asked) -> dict[str, dict[str, Access]]:
     }
 
 
-def _operator(asked: Asked, nodes: Mapping[str, Access]) -> Access:
+def _operator(asked: PolicyOptions, nodes: Mapping[str, Access]) -> Access:
     """Reads all that ours write, calls all that they serve. `ros2` makes nodes with names of its own."""
     read, called = (
         tuple(name for node, a in nodes.items() for name in expanded(getattr(a, kind), asked.namespace, node))

@@ -24,7 +24,7 @@ from objreg_tools.recording.tf_odometry import with_transforms
 from objreg_tools.recording.troubles import troubles
 
 if TYPE_CHECKING:
-    from objreg_ros.bridge.streams.player import Item, Player
+    from objreg_ros.bridge.streams.player import PlayedMessage, Player
 
 LISTEN = (
     "start the nodes with `objreg_graph`, or play to the names that they have, "
@@ -194,14 +194,14 @@ def _advance(bar: tqdm) -> None:
     bar.update(1)
 
 
-def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[Item]:
-    from objreg_ros.bridge.streams.player import Item
+def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[PlayedMessage]:
+    from objreg_ros.bridge.streams.player import PlayedMessage
 
     kinds = {inputs.image: IMAGE, inputs.depth: DEPTH, inputs.points: DEPTH}
     for record in selection.records(source):
         name, kind = selection.names[record.topic], kinds.get(record.topic, "")
         cdr = record.cdr
-        yield Item(name, record.stamp_ns, cdr, kind, header_stamp_ns(cdr) if kind else 0)
+        yield PlayedMessage(name, record.stamp_ns, cdr, kind, header_stamp_ns(cdr) if kind else 0)
 
 
 @contextmanager

@@ -34,7 +34,7 @@ NUMBERED = "times are the numbers of frames: each is taken for a second"
 Pair = tuple[int, str, int, str]  # colour stamp, colour file, depth stamp, depth file
 
 
-class Moment(NamedTuple):
+class FrameFiles(NamedTuple):
     """One record before it is made."""
 
     stamp_ns: int
@@ -47,7 +47,7 @@ class FolderRecording(Recording):
 
     of_pictures = True
 
-    def __init__(self, path: Path, moments: Iterable[Moment], notes: Iterable[str]) -> None:
+    def __init__(self, path: Path, moments: Iterable[FrameFiles], notes: Iterable[str]) -> None:
         self.path, self.notes = path, list(notes)
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
@@ -65,35 +65,39 @@ class FolderRecording(Recording):
                 yield Record.made(topic, TYPES[topic], stamp_ns, make)
 
 
-def moments_of_pairs(folder: Path, pairs: Sequence[Pair], camera: TumCamera) -> list[Moment]:
+def moments_of_pairs(folder: Path, pairs: Sequence[Pair], camera: TumCamera) -> list[FrameFiles]:
     """Colour, depth and camera_info of each pair; larger colour comes in the size of the camera, which is depth's."""
     return [
         moment
         for colour_ns, colour, depth_ns, depth in pairs
         for moment in (
             info_moment(camera, depth_ns),
-            Moment(colour_ns, IMAGE, partial(colour_message, folder / colour, colour_ns, CAMERA_FRAME, camera.size)),
-            Moment(depth_ns, DEPTH, partial(depth_message, folder / depth, depth_ns, CAMERA_FRAME, camera.depth_scale)),
+            FrameFiles(
+                colour_ns, IMAGE, partial(colour_message, folder / colour, colour_ns, CAMERA_FRAME, camera.size)
+            ),
+            FrameFiles(
+                depth_ns, DEPTH, partial(depth_message, folder / depth, depth_ns, CAMERA_FRAME, camera.depth_scale)
+            ),
         )
     ]
 
 
-def info_moment(camera: TumCamera, stamp_ns: int) -> Moment:
+def info_moment(camera: TumCamera, stamp_ns: int) -> FrameFiles:
     """The camera_info of a depth picture."""
     make = partial(messages.camera_info, camera.intrinsics, stamp_ns, CAMERA_FRAME, camera.distortion)
-    return Moment(stamp_ns, CAMERA_INFO, make)
+    return FrameFiles(stamp_ns, CAMERA_INFO, make)
 
 
-def true_moment(T_world_camera: Array, stamp_ns: int) -> Moment:
+def true_moment(T_world_camera: Array, stamp_ns: int) -> FrameFiles:
     """A pose (4, 4) of the camera, optical frame, that counts as true."""
-    return Moment(stamp_ns, GROUND_TRUTH, partial(messages.pose_stamped, T_world_camera, stamp_ns, WORLD_FRAME))
+    return FrameFiles(stamp_ns, GROUND_TRUTH, partial(messages.pose_stamped, T_world_camera, stamp_ns, WORLD_FRAME))
 
 
-def odometry_moment(T_world_camera: Array, stamp_ns: int) -> Moment:
+def odometry_moment(T_world_camera: Array, stamp_ns: int) -> FrameFiles:
     """A pose (4, 4) of the camera, optical frame, in ARKit's world, whose y is up: odometry in a frame with z up."""
     T_odom_camera = rigid(T_ODOM_ARKIT @ T_world_camera)
     make = partial(messages.odometry, T_odom_camera, np.zeros((6, 6)), stamp_ns, ODOM_FRAME, CAMERA_FRAME)
-    return Moment(stamp_ns, ODOM, make)
+    return FrameFiles(stamp_ns, ODOM, make)
 
 
 def pose_of_numbers(numbers: Array) -> Array | None:

@@ -26,7 +26,7 @@ from objreg_tools.recording.folders.folder import (
     DEPTH,
     IMAGE,
     FolderRecording,
-    Moment,
+    FrameFiles,
     info_moment,
     odometry_moment,
     pose_of_numbers,
@@ -52,7 +52,7 @@ FILE_BYTES = 1 << 26  # of one file in it, unpacked: a picture, or the poses of 
 OPTICAL = np.diag([1.0, -1.0, -1.0, 1.0])  # T_camera_optical
 
 
-class Source:
+class Record3dFiles:
     """The files of a recording, packed or in a folder."""
 
     def __init__(self, path: Path) -> None:
@@ -100,7 +100,7 @@ class Record3dRecording(FolderRecording):
     kind = "Record3D recording"
 
     def __init__(self, path: Path) -> None:
-        self._source = Source(path)
+        self._source = Record3dFiles(path)
         try:
             moments, notes = _moments(self._source)
         except BaseException:
@@ -125,7 +125,7 @@ def is_record3d(folder: Path) -> bool:
     )
 
 
-def _moments(source: Source) -> tuple[list[Moment], list[str]]:
+def _moments(source: Record3dFiles) -> tuple[list[FrameFiles], list[str]]:
     known = _metadata(source)
     colours = {int(m[1]): name for name in source.names if (m := COLOUR_NAME.search(name))}
     depths = {
@@ -147,12 +147,16 @@ def _moments(source: Source) -> tuple[list[Moment], list[str]]:
     for number, stamp_ns in zip(both, stamps, strict=True):
         picture = partial(_colour_message, source, colours[number], stamp_ns, camera.size)
         metres = partial(_depth_message, source, known, depths[number], stamp_ns)
-        moments += [info_moment(camera, stamp_ns), Moment(stamp_ns, IMAGE, picture), Moment(stamp_ns, DEPTH, metres)]
+        moments += [
+            info_moment(camera, stamp_ns),
+            FrameFiles(stamp_ns, IMAGE, picture),
+            FrameFiles(stamp_ns, DEPTH, metres),
+        ]
     odometry, of_poses = _odometry(known, both, stamps, source.path)
     return moments + odometry, [*notes, *of_camera, *larger_colour(colour, depth), *of_poses]
 
 
-def _metadata(source: Source) -> Mapping[str, Any]:
+def _metadata(source: Record3dFiles) -> Mapping[str, Any]:
     name = next((name for name in METADATA if name in source.names), None)
     if name is None:
         got = ", ".join(source.names[:5]) or "nothing"
@@ -204,10 +208,10 @@ def _stamps(known: Mapping[str, Any], numbers: list[int], path: Path) -> tuple[l
 
 def _odometry(
     known: Mapping[str, Any], numbers: list[int], stamps: list[int], path: Path
-) -> tuple[list[Moment], list[str]]:
+) -> tuple[list[FrameFiles], list[str]]:
     """The poses of the camera in its optical frame, and a note on those that are none; no pose where none is given."""
     poses = known.get("poses") or []
-    moments: list[Moment] = []
+    moments: list[FrameFiles] = []
     for number, stamp_ns in zip(numbers, stamps, strict=True):
         if number >= len(poses):
             break
@@ -223,25 +227,25 @@ def _odometry(
     return moments, passed_over(len(numbers) - len(moments), len(numbers), "metadata") if poses else []
 
 
-def _first_colour(source: Source, names: list[str]) -> Size:
+def _first_colour(source: Record3dFiles, names: list[str]) -> Size:
     pixels = decode_picture(source.read(names[0]), f"{source.path}/{names[0]}", COLOUR)
     return pixels.shape[1], pixels.shape[0]
 
 
-def _first_depth(source: Source, known: Mapping[str, Any], names: list[str]) -> Size:
+def _first_depth(source: Record3dFiles, known: Mapping[str, Any], names: list[str]) -> Size:
     metres = _metres(source, known, names[0])
     return metres.shape[1], metres.shape[0]
 
 
-def _metres(source: Source, known: Mapping[str, Any], name: str) -> Array:
+def _metres(source: Record3dFiles, known: Mapping[str, Any], name: str) -> Array:
     return metres_of(source.read(name), name, f"{source.path}/{name}", known)
 
 
-def _colour_message(source: Source, name: str, stamp_ns: int, size: Size) -> Any:
+def _colour_message(source: Record3dFiles, name: str, stamp_ns: int, size: Size) -> Any:
     pixels = decode_picture(source.read(name), f"{source.path}/{name}", COLOUR)
     rgb = cv2.cvtColor(brought_to(pixels, size), cv2.COLOR_BGR2RGB)
     return messages.image(np.asarray(rgb), "rgb8", stamp_ns, CAMERA_FRAME)
 
 
-def _depth_message(source: Source, known: Mapping[str, Any], name: str, stamp_ns: int) -> Any:
+def _depth_message(source: Record3dFiles, known: Mapping[str, Any], name: str, stamp_ns: int) -> Any:
     return messages.image(_metres(source, known, name), "32FC1", stamp_ns, CAMERA_FRAME)

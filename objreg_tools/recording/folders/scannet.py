@@ -17,7 +17,14 @@ from objreg_ros.bridge.camera.calibration_files import parse_camera
 from objreg_ros.data.checked import Array
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import is_rigid, rigid
-from objreg_tools.recording.folders.folder import NUMBERED, FolderRecording, Moment, Pair, moments_of_pairs, true_moment
+from objreg_tools.recording.folders.folder import (
+    NUMBERED,
+    FolderRecording,
+    FrameFiles,
+    Pair,
+    moments_of_pairs,
+    true_moment,
+)
 from objreg_tools.recording.folders.picture_files import (
     MILLIMETRES,
     Size,
@@ -107,7 +114,7 @@ def _camera(folder: Path, colour: Size, depth: Size) -> tuple[TumCamera, list[st
     raise FileNotFoundError(f"{folder}: expected intrinsic_depth.txt or intrinsic_color.txt, got {got}")
 
 
-def _truth(folder: Path, stems: set[str]) -> tuple[list[Moment], list[str]]:
+def _truth(folder: Path, stems: set[str]) -> tuple[list[FrameFiles], list[str]]:
     """The poses of the frames, and a note on those that BundleFusion lost: it writes -inf."""
     files = sorted((file for file in folder.glob("*.txt") if file.stem in stems), key=lambda file: int(file.stem))
     known = [(int(file.stem), _pose(file)) for file in files]

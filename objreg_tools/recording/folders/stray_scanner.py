@@ -24,7 +24,7 @@ from objreg_tools.recording.folders.folder import (
     DEPTH,
     IMAGE,
     FolderRecording,
-    Moment,
+    FrameFiles,
     info_moment,
     odometry_moment,
     pose_of_numbers,
@@ -74,8 +74,8 @@ class StrayRecording(FolderRecording):
             picture = partial(depth_message, path / depths[frame], stamp_ns, CAMERA_FRAME, MILLIMETRES)
             moments += [
                 info_moment(camera, stamp_ns),
-                Moment(stamp_ns, IMAGE, colour),
-                Moment(stamp_ns, DEPTH, picture),
+                FrameFiles(stamp_ns, IMAGE, colour),
+                FrameFiles(stamp_ns, DEPTH, picture),
             ]
         alone = len(table.rows) + len(depths) - 2 * len(rows)
         left = [f"{alone} frames have no depth or no pose and are left out"] if alone else []
@@ -153,10 +153,10 @@ def _frame(row: list[str], folder: Path) -> int:
     return int(row[1])
 
 
-def _odometry(rows: list[list[str]], table: Table, folder: Path) -> tuple[list[Moment], list[str]]:
+def _odometry(rows: list[list[str]], table: Table, folder: Path) -> tuple[list[FrameFiles], list[str]]:
     """The poses of the camera, and a note on rows that are none."""
     columns = pose_columns(table.names or COLUMNS)
-    moments: list[Moment] = []
+    moments: list[FrameFiles] = []
     for row in rows:
         try:
             T_world_camera = pose_of_numbers(np.array([float(row[k]) for k in columns]))

@@ -23,7 +23,7 @@ from objreg_tools.recording.folders.folder import (
     IMU,
     NUMBERED,
     FolderRecording,
-    Moment,
+    FrameFiles,
     Pair,
     moments_of_pairs,
     pose_of_numbers,
@@ -176,22 +176,22 @@ def _around(stamps: Array, stamp: int) -> list[tuple[int, int]]:
     return [(j, int(stamps[j])) for j in (place - 1, place) if 0 <= j < len(stamps)]
 
 
-def _accelerations(file: Path, first_ns: int, last_ns: int) -> list[Moment]:
+def _accelerations(file: Path, first_ns: int, last_ns: int) -> list[FrameFiles]:
     """The rows of an accelerometer within a time; none where there is no such file."""
     samples = [_acceleration(row, file) for row in read_table(file, 4).rows] if file.exists() else []
     return [sample for sample in samples if first_ns <= sample.stamp_ns <= last_ns]
 
 
-def _acceleration(row: list[str], file: Path) -> Moment:
+def _acceleration(row: list[str], file: Path) -> FrameFiles:
     try:
         numbers = [float(text) for text in row[1:4]]
     except ValueError as error:
         raise ValueError(f"{file}: expected timestamp ax ay az, got {' '.join(row)}") from error
     stamp_ns = stamp_of(row[0], file)
-    return Moment(stamp_ns, IMU, partial(messages.imu, numbers, None, stamp_ns, IMU_FRAME))
+    return FrameFiles(stamp_ns, IMU, partial(messages.imu, numbers, None, stamp_ns, IMU_FRAME))
 
 
-def _ground_truth(file: Path, frame_numbers: bool) -> tuple[list[Moment], list[str]]:
+def _ground_truth(file: Path, frame_numbers: bool) -> tuple[list[FrameFiles], list[str]]:
     """The poses of a file, none where there is no such file, and notes on it. ``frame_numbers`` is of the pictures."""
     if not file.exists():
         return [], []
@@ -205,7 +205,7 @@ def _ground_truth(file: Path, frame_numbers: bool) -> tuple[list[Moment], list[s
     return moments, notes
 
 
-def _true_moment(row: list[str], columns: Sequence[int], file: Path) -> Moment | None:
+def _true_moment(row: list[str], columns: Sequence[int], file: Path) -> FrameFiles | None:
     """A row of the ground truth; None where its numbers are no pose. ValueError where they are no numbers."""
     try:
         numbers = np.array([float(row[k]) for k in columns])

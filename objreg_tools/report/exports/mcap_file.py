@@ -15,7 +15,7 @@ from objreg_ros.whole_file import folder_for, put_whole
 from objreg_tools.recording.record import Record
 from objreg_tools.recording.rosbag import messages
 from objreg_tools.recording.rosbag.writer import write_rosbag2
-from objreg_tools.report.exports.run_scene import Edge, Moment, RunScene, Trajectory
+from objreg_tools.report.exports.run_scene import ClosureEdge, RunScene, SceneFrame, ShownTrajectory
 
 MAP, CAMERA = "map", "camera"  # frames
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4")])
@@ -53,7 +53,7 @@ def _records(scene: RunScene) -> Iterator[Record]:
         yield from _seen(moment)
 
 
-def _path(trajectory: Trajectory, stamp_ns: int) -> Any:
+def _path(trajectory: ShownTrajectory, stamp_ns: int) -> Any:
     poses = [messages.pose_stamped(T, at, MAP) for at, T in zip(trajectory.stamps_ns, trajectory.poses, strict=True)]
     return messages.message("nav_msgs/Path", header=messages.header(stamp_ns, MAP), poses=poses)
 
@@ -72,7 +72,7 @@ def _transform(T_map_camera: Array, stamp_ns: int) -> Any:
     return messages.message("tf2_msgs/TFMessage", transforms=[stamped])
 
 
-def _seen(moment: Moment) -> Iterator[Record]:
+def _seen(moment: SceneFrame) -> Iterator[Record]:
     stamp_ns = moment.stamp_ns
     _, jpeg = cv2.imencode(".jpg", moment.rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     head = messages.header(stamp_ns, CAMERA)
@@ -86,7 +86,7 @@ def _seen(moment: Moment) -> Iterator[Record]:
     yield Record.of("/camera/points", messages.point_cloud(points, stamp_ns, CAMERA), stamp_ns)
 
 
-def _closures(edges: Sequence[Edge], stamp_ns: int) -> Iterator[Any]:
+def _closures(edges: Sequence[ClosureEdge], stamp_ns: int) -> Iterator[Any]:
     """The lines of each verdict, and beside each line its labels and true error."""
     for verdict, colour in COLOURS.items():
         ends = [end for edge in edges if edge.verdict == verdict for end in edge.ends]

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from objreg_ros.whole_file import folder_for, put_whole
-from objreg_tools.report.exports.run_scene import Edge, Moment, RunScene
+from objreg_tools.report.exports.run_scene import ClosureEdge, RunScene, SceneFrame
 
 COLOURS = {
     "odometry": (217, 89, 38),
@@ -64,7 +64,7 @@ def _log_trajectories(rr: ModuleType, recording: Any, scene: RunScene) -> None:
         recording.log(f"map/trajectories/{name}", lines, static=True)
 
 
-def _log_closures(rr: ModuleType, recording: Any, edges: tuple[Edge, ...]) -> None:
+def _log_closures(rr: ModuleType, recording: Any, edges: tuple[ClosureEdge, ...]) -> None:
     """A line for each closure; its labels and its true error show when the pointer is over it."""
     for verdict in dict.fromkeys(edge.verdict for edge in edges):
         of = [edge for edge in edges if edge.verdict == verdict]
@@ -92,7 +92,7 @@ def _log_objects(rr: ModuleType, recording: Any, scene: RunScene) -> None:
         recording.log(["map", "objects", label], points, static=True)
 
 
-def _log_moment(rr: ModuleType, recording: Any, moment: Moment) -> None:
+def _log_moment(rr: ModuleType, recording: Any, moment: SceneFrame) -> None:
     recording.set_time("time", timestamp=np.datetime64(moment.stamp_ns, "ns"))
     T, camera = moment.T_map_camera, moment.camera
     recording.log("map/camera", rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]))

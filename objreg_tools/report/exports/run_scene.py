@@ -24,7 +24,7 @@ LEAST_COMMON = 3  # poses that truth and map must share for their alignment
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
+class ShownTrajectory:
     """Where the camera was: ``poses (N, 4, 4)`` in the frame of the map at ``stamps_ns``, which rise."""
 
     stamps_ns: tuple[int, ...]
@@ -37,7 +37,7 @@ class Trajectory:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Edge:
+class ClosureEdge:
     """A closure between two places, ``ends (2, 3)`` m, with its labels and true error as text.
 
     ``verdict`` is ``accepted``, ``pruned`` by the mapper, or ``false`` where truth says so.
@@ -50,7 +50,7 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moment:
+class SceneFrame:
     """The view of a ``camera`` at one time: ``rgb (H, W, 3)``, and points ``xyz (N, 3)`` m in it with ``colours``."""
 
     stamp_ns: int
@@ -71,17 +71,17 @@ class RunScene:
     """
 
     name: str
-    trajectories: Mapping[str, Trajectory]
-    edges: tuple[Edge, ...]
+    trajectories: Mapping[str, ShownTrajectory]
+    edges: tuple[ClosureEdge, ...]
     objects: tuple[tuple[str, Array], ...]
     album: Album
 
     @property
-    def main(self) -> Trajectory:
+    def main(self) -> ShownTrajectory:
         """The trajectory on which the camera is shown."""
         return self.trajectories["corrected"] if "corrected" in self.trajectories else self.trajectories["true"]
 
-    def moments(self) -> Iterator[Moment]:
+    def moments(self) -> Iterator[SceneFrame]:
         """The views at evenly spread times; those whose picture cannot be read are left out."""
         trajectory = self.main
         count = len(trajectory.stamps_ns)
@@ -100,26 +100,26 @@ def scene_of(run: RunSummary, album: Album) -> RunScene:
     return RunScene(run.name, trajectories, _edges(run, scene.main), scene.objects, album)
 
 
-def _trajectories(run: RunSummary) -> dict[str, Trajectory]:
+def _trajectories(run: RunSummary) -> dict[str, ShownTrajectory]:
     stamps, odometry, corrected = run.poses_before_and_after()
     if not run.has_trajectory:
         return _true_trajectory(run, [glimpse.stamp_ns for glimpse in run.glimpses] or run.truth.stamps_ns)
-    trajectories = {name: Trajectory(tuple(stamps), np.array(poses)) for name, poses in
+    trajectories = {name: ShownTrajectory(tuple(stamps), np.array(poses)) for name, poses in
             ((run.source, odometry), ("corrected", corrected))}  # fmt: skip
     true = _true_trajectory(run, stamps).get("true")
     if true is not None and len(true.stamps_ns) >= LEAST_COMMON:
         of = dict(zip(stamps, corrected, strict=True))
         T_map_truth = rigid_fit(true.positions, positions([of[stamp] for stamp in true.stamps_ns]))
-        trajectories["true"] = Trajectory(true.stamps_ns, T_map_truth @ true.poses)
+        trajectories["true"] = ShownTrajectory(true.stamps_ns, T_map_truth @ true.poses)
     return trajectories
 
 
-def _true_trajectory(run: RunSummary, stamps_ns: list[int]) -> dict[str, Trajectory]:
+def _true_trajectory(run: RunSummary, stamps_ns: list[int]) -> dict[str, ShownTrajectory]:
     known = {stamp: T for stamp in sorted(set(stamps_ns)) if (T := run.truth.at(stamp)) is not None}
-    return {"true": Trajectory(tuple(known), np.array(list(known.values())))} if known else {}
+    return {"true": ShownTrajectory(tuple(known), np.array(list(known.values())))} if known else {}
 
 
-def _edges(run: RunSummary, trajectory: Trajectory) -> tuple[Edge, ...]:
+def _edges(run: RunSummary, trajectory: ShownTrajectory) -> tuple[ClosureEdge, ...]:
     """The closures with both stamps on the trajectory, at the nearest of its poses."""
     stamps, places = np.array(trajectory.stamps_ns), trajectory.positions
     pruned = set(map(id, run.pruned))
@@ -129,7 +129,7 @@ def _edges(run: RunSummary, trajectory: Trajectory) -> tuple[Edge, ...]:
             continue
         ends = places[[int(np.abs(stamps - stamp).argmin()) for stamp in (closure.from_ns, closure.to_ns)]]
         verdict = "false" if run.is_false(closure) else "pruned" if id(closure) in pruned else "accepted"
-        edges.append(Edge(closure, ends, verdict, _text(run, closure)))
+        edges.append(ClosureEdge(closure, ends, verdict, _text(run, closure)))
     return tuple(edges)
 
 
@@ -139,7 +139,7 @@ def _text(run: RunSummary, closure: LoopClosure) -> str:
     return f"{', '.join(closure.labels)}{off}"
 
 
-def _moment(image: DepthImage, rgb: Array, stamp_ns: int, T_map_camera: Array) -> Moment:
+def _moment(image: DepthImage, rgb: Array, stamp_ns: int, T_map_camera: Array) -> SceneFrame:
     camera = image.intrinsics
     step = max(1, round((image.depth.size / MOST_POINTS) ** 0.5))
     at = np.s_[step // 2 :: step, step // 2 :: step]
@@ -147,7 +147,7 @@ def _moment(image: DepthImage, rgb: Array, stamp_ns: int, T_map_camera: Array) -
     seen = (image.depth[at] > 0) & (image.depth[at] < FARTHEST_M)
     reduced = max(1, camera.width // WIDTH)
     small = camera.scaled(reduced)
-    return Moment(
+    return SceneFrame(
         stamp_ns=stamp_ns,
         T_map_camera=T_map_camera,
         camera=small,

@@ -81,6 +81,12 @@ def of_one_clock(closures: Sequence[LoopClosure]) -> list[LoopClosure]:
     return [closure for closure in closures if closure.from_ns < closure.to_ns]
 
 
+def _nameless(closures: Sequence[LoopClosure]) -> list[tuple[LoopClosure, LoopClosure]]:
+    """Each closure of one robot without its name, as the frames of a run have none, and as it was."""
+    alone = [closure for closure in closures if closure.from_robot == closure.to_robot]
+    return [(replace(one, from_robot="", to_robot="") if one.from_robot else one, one) for one in alone]
+
+
 def with_sessions(closures: Sequence[LoopClosure], frames: Sequence[TrackedFrame]) -> tuple[LoopClosure, ...]:
     """The closures with the sessions of their keyframes, by frames whose stamps increase."""
     stamps = [frame.stamp_ns for frame in frames]
@@ -116,7 +122,9 @@ def _solved(
     sessions: dict[int, list[TrackedFrame]], closures: Sequence[LoopClosure], params: MapperParams | None
 ) -> tuple[CameraMap, set[int]]:
     """The part of the map that the first of the sessions is in, and the names of the sessions that are there too."""
-    graph, implausible = _graph_of(sessions, closures, params)
+    known = _nameless(of_one_clock(closures))
+    graph, implausible = _graph_of(sessions, [nameless for nameless, _ in known], params)
+    named = {id(nameless): closure for nameless, closure in known}
     try:
         pruned, unsolved = graph.optimise().pruned, ""
     except ImportError as error:
@@ -124,8 +132,8 @@ def _solved(
     placed = {name: number for number, name in enumerate(sessions) if graph.is_in_map(number)}
     mapped = [frame for name, number in placed.items() for frame in _mapped(graph, number, sessions[name])]
     mapped.sort(key=lambda frame: frame.stamp_ns)
-    made = CameraMap(graph, tuple(mapped), len(placed), pruned=(*pruned, *implausible), unsolved=unsolved)
-    return made, set(placed)
+    left_out = tuple(named[id(one)] for one in (*pruned, *implausible))
+    return CameraMap(graph, tuple(mapped), len(placed), pruned=left_out, unsolved=unsolved), set(placed)
 
 
 def _graph_of(
@@ -137,7 +145,7 @@ def _graph_of(
         graph.begin_session(name)
         for frame in frames:
             graph.add_odometry(Odometry(T_odom_body=frame.T_session_camera, stamp_ns=frame.stamp_ns))
-    for closure in of_one_clock(closures):
+    for closure in closures:
         try:
             graph.add_closure(closure)
         except ImplausibleError:

@@ -16,7 +16,7 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.images import DepthImage
 from objreg_ros.geometry import back_project
 from objreg_tools.report.packed import encoded, packed
-from objreg_tools.report.run.pairs import Pair, by_interest
+from objreg_tools.report.run.pairs import PairRow, by_interest
 from objreg_tools.report.run.pictures import Album
 
 PAGE_BYTES = 4_000_000  # of all clouds of a page; that of one run has 15 MB for everything
@@ -36,7 +36,7 @@ class Clouds:
     absent: dict[str, str] = field(default_factory=dict)
     size: int = 0
 
-    def add(self, pair: Pair, album: Album, most_bytes: int) -> None:
+    def add(self, pair: PairRow, album: Album, most_bytes: int) -> None:
         """Both clouds of a pair and its pose, or why they are absent."""
         stamps_ns = (pair.outcome.from_ns, pair.outcome.to_ns)
         seen = {stamp_ns: image for stamp_ns in stamps_ns if (image := album.at(stamp_ns)) is not None}
@@ -62,7 +62,7 @@ class Clouds:
         )
 
 
-def clouds(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAGE_BYTES) -> Clouds:
+def clouds(pairs: Iterable[PairRow], album: Album | None, most_bytes: int = PAGE_BYTES) -> Clouds:
     """The clouds of the pairs that have a pose: of false constraints first, then of right ones, then of refusals."""
     made = Clouds()
     if album is None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_tools.report.run.pairs import Pair, pairs_of
+from objreg_tools.report.run.pairs import PairRow, pairs_of
 from objreg_tools.report.run.run_summary import RunSummary
 from objreg_tools.report.run.sections import View, judged, spaced
 from objreg_tools.report.run.trajectory_error import root_mean_square
@@ -131,7 +131,7 @@ def _apart_ns(one: LoopClosure, other: LoopClosure | Rejected) -> int:
     return max(abs(one.from_ns - other.from_ns), abs(one.to_ns - other.to_ns))
 
 
-def _changed(pair: Pair, run: int, other: RunSummary) -> View:
+def _changed(pair: PairRow, run: int, other: RunSummary) -> View:
     """A closure that only one run has, and what became of it in the other."""
     error = "" if pair.error is None else f"{pair.error[0]:.1f}° and {pair.error[1]:.1f} cm"
     times = f"{pair.seconds[0]:.1f} s ↔ {pair.seconds[1]:.1f} s"
@@ -140,7 +140,7 @@ def _changed(pair: Pair, run: int, other: RunSummary) -> View:
             "instead": _instead(pair, other)}  # fmt: skip
 
 
-def _instead(pair: Pair, other: RunSummary) -> str:
+def _instead(pair: PairRow, other: RunSummary) -> str:
     """Why the other run refused the same pair; ``not tried`` where it did not try it."""
     if not isinstance(pair.outcome, LoopClosure):
         return ""

@@ -23,7 +23,7 @@ CLUSTER_RADIUS = 0.5  # m around a place that is named on the map
 CLUSTER_SIGHTINGS = 4  # of one label there, at least
 
 
-class Ground:
+class GroundAxes:
     """The plane in which a trajectory is drawn: the two directions in which it extends the most."""
 
     def __init__(self, xyz: Array) -> None:
@@ -38,7 +38,7 @@ class Ground:
 
 def trajectory(run: RunSummary, stamps_ns: Array, lines: Mapping[str, Array], width: int = WIDE) -> str:
     """Trajectories (N, 3) by CSS class from above, at stamps (N,), and the closures as links on the last of them."""
-    ground = Ground(next(iter(lines.values())) if "true" in lines else list(lines.values())[-1])
+    ground = GroundAxes(next(iter(lines.values())) if "true" in lines else list(lines.values())[-1])
     flat = {name: ground.flat(xyz) for name, xyz in lines.items()}
     plot = Plot.equal(np.concatenate(list(flat.values())), width)
     plot.x_axis("m")
@@ -105,7 +105,7 @@ def object_map(run: RunSummary, corrected: bool, width: int = HALF) -> str:
     if tracks is None or not seen:
         return ""
     _, odometry, poses = run.poses_before_and_after()
-    ground = Ground(np.array([T[:3, 3] for T in poses]))
+    ground = GroundAxes(np.array([T[:3, 3] for T in poses]))
     line = poses if corrected else odometry
     xy = ground.flat(np.array([row[2 if corrected else 1] for row in seen]))
     both = np.concatenate([ground.flat(np.array(places)), ground.flat(np.array([row[1] for row in seen]))])

@@ -78,7 +78,7 @@ def _nearest(stamps_ns: Iterable[int], stamp_ns: int) -> int | None:
     return min(near, key=lambda stamp: abs(stamp - stamp_ns), default=None)
 
 
-class Cameras:
+class CamerasByStamp:
     """The calibrated camera_infos of a topic, without those that repeat the one before them."""
 
     def __init__(self, recording: Recording, topic: str | None) -> None:

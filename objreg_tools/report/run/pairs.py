@@ -18,7 +18,7 @@ ACCEPTED = "accepted"
 
 
 @dataclass(frozen=True)
-class Pair:
+class PairRow:
     """A constraint or a refusal. ``key`` names it on the page, within its run."""
 
     key: str
@@ -61,12 +61,20 @@ class Pair:
 
     @property
     def text(self) -> str:
-        """The numbers behind a refusal, what moved, and the true error."""
+        """Which cameras saw it, where they are two; the numbers behind a refusal, what moved, and the true error."""
         if isinstance(self.outcome, Rejected):
             parts = [self.outcome.detail]
         else:
             parts = [f"{label} moved by {metres:.2f} m" for label, metres in self.outcome.moved.items()]
-        return ". ".join(part for part in (*parts, self._in_truth) if part)
+        return ". ".join(part for part in (self._cameras, *parts, self._in_truth) if part)
+
+    @property
+    def _cameras(self) -> str:
+        """The two cameras, with their robots; empty where one camera saw both, and where it is not known."""
+        outcome = self.outcome
+        ends = (outcome.from_robot, outcome.from_frame_id), (outcome.to_robot, outcome.to_frame_id)
+        first, then = ("/".join(filter(None, (robot, frame_id))) for robot, frame_id in ends)
+        return f"{first}, then {then}" if first and then and first != then else ""
 
     @property
     def _in_truth(self) -> str:
@@ -80,16 +88,16 @@ class Pair:
         return f"{apart}{off}."
 
 
-def pairs_of(run: RunSummary) -> list[Pair]:
+def pairs_of(run: RunSummary) -> list[PairRow]:
     """All constraints (keys c0, c1, …) and then all refusals (r0, r1, …) of a run, in the order of its JSON."""
     items: Iterable[tuple[str, LoopClosure | Rejected]] = (
         *((f"c{k}", closure) for k, closure in enumerate(run.closures)),
         *((f"r{k}", refusal) for k, refusal in enumerate(run.refusals)),
     )
-    return [Pair(key, item, run) for key, item in items]
+    return [PairRow(key, item, run) for key, item in items]
 
 
-def by_interest(pairs: Iterable[Pair]) -> list[Pair]:
+def by_interest(pairs: Iterable[PairRow]) -> list[PairRow]:
     """False constraints first, then right ones, refused poses, what was tried without one, and the rest."""
     ranks = {"false": 0, ACCEPTED: 1, "refused": 2}
     return sorted(pairs, key=lambda pair: (not pair.tried, pair.outcome.T_from_to is None, ranks[pair.verdict]))

@@ -20,7 +20,7 @@ from objreg_ros.segmenter.sensor.organise import organise
 from objreg_tools.recording.inputs import Inputs
 from objreg_tools.recording.mounts import first_readable, frame_of, frame_tree
 from objreg_tools.recording.record import Recording
-from objreg_tools.report.run.messages_by_stamp import SLOP_NS, Cameras, MessagesByStamp
+from objreg_tools.report.run.messages_by_stamp import SLOP_NS, CamerasByStamp, MessagesByStamp
 from objreg_tools.report.run.run_summary import RunSummary
 
 WIDTH = 320  # px of one picture
@@ -39,7 +39,9 @@ class Album:
         self._is_cloud = inputs.depth is None
         image = None if self._is_cloud else inputs.image  # a cloud has its colour in it
         self._source, self._image = (MessagesByStamp(recording, topic) if topic else None for topic in (source, image))
-        self._cameras, self._of_colour = (Cameras(recording, t) for t in (inputs.camera_info, inputs.colour_info))
+        self._cameras, self._of_colour = (
+            CamerasByStamp(recording, t) for t in (inputs.camera_info, inputs.colour_info)
+        )
         self._raw = lenses.raw_pictures(rectified, source, inputs.image)
         self._named = colour_frame.named_registered(inputs.depth, inputs.image)
         self._find_pose = frame_tree(recording).between

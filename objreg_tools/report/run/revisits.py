@@ -25,7 +25,7 @@ DEPTH_TOLERANCE = 0.05  # m, and as much again for every 2 m of depth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class SeenPlace:
     """What was seen at one time, and from which true pose."""
 
     stamp_ns: int
@@ -43,12 +43,12 @@ class Revisit:
     overlap: float
 
 
-def overlap(a: Seen, b: Seen) -> float:
+def overlap(a: SeenPlace, b: SeenPlace) -> float:
     """The share 0..1 of the points of one view that the other measured too, the smaller of both directions."""
     return min(_share(a, b), _share(b, a))
 
 
-def revisits(moments: Sequence[Seen], gap_ns: int, least: float = 0.25) -> list[Revisit]:
+def revisits(moments: Sequence[SeenPlace], gap_ns: int, least: float = 0.25) -> list[Revisit]:
     """Every view (in time order) with an earlier one, at least ``gap_ns`` before, that it overlaps by ``least``."""
     found = []
     for k, later in enumerate(moments):
@@ -58,7 +58,7 @@ def revisits(moments: Sequence[Seen], gap_ns: int, least: float = 0.25) -> list[
     return found
 
 
-def revisit_of(later: Seen, earlier: Iterable[Seen], least: float = 0.25) -> Revisit | None:
+def revisit_of(later: SeenPlace, earlier: Iterable[SeenPlace], least: float = 0.25) -> Revisit | None:
     """The revisit of the earlier view that the later one overlaps most; None if none by ``least``."""
     best, partner = max(((overlap(m, later), m) for m in earlier), key=lambda item: item[0], default=(0.0, later))
     if best < least:
@@ -86,7 +86,7 @@ def recall_by_view_change(
     return {name: (sum(goods), len(goods)) for name, goods in counts.items()}
 
 
-def _share(a: Seen, b: Seen) -> float:
+def _share(a: SeenPlace, b: SeenPlace) -> float:
     """The share of the points of a that b measured too."""
     xyz = a.view.xyz[::STEP, ::STEP].reshape(-1, 3)
     xyz = xyz[np.isfinite(xyz[:, 2])]

@@ -12,7 +12,7 @@ from objreg_ros.data.closures import UNTRIED
 from objreg_tools.report.run import clouds, figures, findings, thumbnails
 from objreg_tools.report.run.camera_map import of_one_clock
 from objreg_tools.report.run.clouds import Clouds
-from objreg_tools.report.run.pairs import ACCEPTED, Pair, pairs_of
+from objreg_tools.report.run.pairs import ACCEPTED, PairRow, pairs_of
 from objreg_tools.report.run.pictures import Album, chosen_closures, chosen_refusals, data_uri, overlay
 from objreg_tools.report.run.reasons import MEANINGS
 from objreg_tools.report.run.run_summary import RunSummary, Tracks
@@ -215,7 +215,7 @@ def _reasons(run: RunSummary) -> list[View]:
     ]
 
 
-def _browser(pairs: Sequence[Pair], drawn: Thumbnails, album: Album | None) -> View:
+def _browser(pairs: Sequence[PairRow], drawn: Thumbnails, album: Album | None) -> View:
     """The table of all pairs, what its pictures lack, and what a pane shows of each."""
     counts = Counter(pair.reason for pair in pairs)
     return {
@@ -237,7 +237,7 @@ def _clouds(made: Clouds) -> View:
     return {"lacking": made.lacking, "data": data if made.poses else None}
 
 
-def _row(pair: Pair) -> View:
+def _row(pair: PairRow) -> View:
     degrees, centimetres = pair.error or (None, None)
     return {
         "key": pair.key,
@@ -253,7 +253,7 @@ def _row(pair: Pair) -> View:
     }
 
 
-def _pane(pair: Pair) -> View:
+def _pane(pair: PairRow) -> View:
     """The text of the pane beside the pictures of a pair."""
     return {
         "from": str(pair.outcome.from_ns),
@@ -275,7 +275,7 @@ def _lacking(drawn: Thumbnails, count: int) -> str:
     return " ".join(parts)
 
 
-def _galleries(pairs: Sequence[Pair], run: RunSummary, album: Album) -> list[View]:
+def _galleries(pairs: Sequence[PairRow], run: RunSummary, album: Album) -> list[View]:
     """A few accepted and a few refused pairs with their pictures."""
     by_identity = {id(pair.outcome): pair for pair in pairs}
     accepted = [by_identity[id(closure)] for closure in chosen_closures(run)]
@@ -288,7 +288,7 @@ def _galleries(pairs: Sequence[Pair], run: RunSummary, album: Album) -> list[Vie
     return [gallery for gallery in both if gallery["text"]]
 
 
-def _gallery(title: str, text: str, chosen: Sequence[Pair], album: Album) -> View:
+def _gallery(title: str, text: str, chosen: Sequence[PairRow], album: Album) -> View:
     cards = [card for pair in chosen if (card := _card(pair, album))]
     whys = Counter(why for p in chosen if (why := album.lacking(p.outcome.from_ns) or album.lacking(p.outcome.to_ns)))
     reasons = "; ".join(why if count == 1 else f"{why} ({count} times)" for why, count in whys.most_common())
@@ -296,7 +296,7 @@ def _gallery(title: str, text: str, chosen: Sequence[Pair], album: Album) -> Vie
     return {"title": title, "text": " ".join(filter(None, (text if cards else "", lacking))), "cards": cards}
 
 
-def _card(pair: Pair, album: Album) -> View | None:
+def _card(pair: PairRow, album: Album) -> View | None:
     """Two pictures side by side and over each other; None where the recording lacks a picture."""
     first, second = album.at(pair.outcome.from_ns), album.at(pair.outcome.to_ns)
     if first is None or second is None or first.rgb is None or second.rgb is None:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from objreg_ros.data.images import DepthImage
-from objreg_tools.report.run.pairs import Pair, by_interest
+from objreg_tools.report.run.pairs import PairRow, by_interest
 from objreg_tools.report.run.pictures import Album, data_uri, overlay
 
 PAGE_BYTES = 7_000_000  # of all thumbnails of a page; that of one run has 15 MB for everything
@@ -28,7 +28,7 @@ class Thumbnails:
     left_out: int = 0
     size: int = 0
 
-    def add(self, pair: Pair, album: Album, most_bytes: int) -> None:
+    def add(self, pair: PairRow, album: Album, most_bytes: int) -> None:
         """Both pictures of a pair, and the second over the first by its pose; nothing where they have no place."""
         first, second = album.at(pair.outcome.from_ns), album.at(pair.outcome.to_ns)
         if first is None or second is None:
@@ -55,7 +55,7 @@ class Thumbnails:
         }
 
 
-def thumbnails(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAGE_BYTES) -> Thumbnails:
+def thumbnails(pairs: Iterable[PairRow], album: Album | None, most_bytes: int = PAGE_BYTES) -> Thumbnails:
     """The pictures of pairs, the most interesting first; of what was tried, or has two stamps at least."""
     drawn = Thumbnails()
     if album is None:

@@ -14,7 +14,7 @@ from objreg_tools.report.store.store_summary import StoreSummary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class MapPlace:
     """Where a session saw a landmark last, ``xy (2,)`` m, and in how many of its keyframes."""
 
     landmark: int
@@ -33,7 +33,7 @@ class SessionMap:
     session: int
     axes: tuple[str, str]
     trajectory: Array
-    places: tuple[Place, ...]
+    places: tuple[MapPlace, ...]
     moves: tuple[tuple[str, Array, Array], ...]
 
     @property
@@ -60,7 +60,7 @@ def _mapped(found: StoreSummary, session: int, rows: Sequence[Sighting], labels:
         session=session,
         axes=("xyz"[plane[0]], "xyz"[plane[1]]),
         trajectory=trajectory[:, plane],
-        places=tuple(Place(n, labels[n], of[-1].position[plane], len(of)) for n, of in sorted(seen.items())),
+        places=tuple(MapPlace(n, labels[n], of[-1].position[plane], len(of)) for n, of in sorted(seen.items())),
         moves=tuple(
             (move.here.label, move.nearest.stood[plane], move.nearest.here.position[plane])
             for move in found.moves.known

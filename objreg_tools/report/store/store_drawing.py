@@ -12,7 +12,7 @@ from objreg_ros.data.checked import Array
 from objreg_ros.memory.landmarks import Landmark
 from objreg_tools.report.drawing import ticks
 from objreg_tools.report.store.portraits import TILE
-from objreg_tools.report.store.session_map import Place, SessionMap, session_maps
+from objreg_tools.report.store.session_map import MapPlace, SessionMap, session_maps
 from objreg_tools.report.store.store_summary import StoreSummary
 
 PANEL = 640  # px of a session
@@ -108,7 +108,7 @@ def _draw_axes(sheet: Array, axes: tuple[str, str], scale: float, low: Array) ->
     _write(sheet, f"{axes[1]} [m]", (8, TOP - 6), INK)
 
 
-def _radius(place: Place) -> int:
+def _radius(place: MapPlace) -> int:
     return 3 + min(place.sightings, 10) // 2
 
 
@@ -118,7 +118,7 @@ def _draw_move(sheet: Array, stood: list[int], stands: list[int]) -> None:
     cv2.arrowedLine(sheet, stood, stands, MOVED, 2, cv2.LINE_AA, tipLength=0.3)
 
 
-def _name(sheet: Array, at: Mapping[Place, list[int]]) -> None:
+def _name(sheet: Array, at: Mapping[MapPlace, list[int]]) -> None:
     """The ids beside the dots, those that were seen most first; one that would lie upon another is left out."""
     taken = np.zeros(sheet.shape[:2], bool)
     for place in sorted(at, key=lambda place: -place.sightings):

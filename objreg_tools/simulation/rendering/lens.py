@@ -10,7 +10,7 @@ import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.images import Intrinsics
-from objreg_tools.simulation.rendering.view import View
+from objreg_tools.simulation.rendering.view import RenderedView
 
 ITERATIONS = 60
 MOST_ERROR_PX = 0.02
@@ -21,7 +21,7 @@ WIDEST = 3.0
 """A drawn view is at most this many times as wide and as high as the picture."""
 
 
-class Lens:
+class SimulatedLens:
     """A lens before a camera: draw the view of ``wide``, a pinhole camera that sees all of the picture, and bend it.
 
     ``rays (H, W, 2) float32`` are x/z and y/z of what every pixel of the picture sees; ``row`` and ``column`` are where
@@ -54,7 +54,7 @@ class Lens:
         self._u = (u + self.column).reshape(shape).astype(np.float32)
         self._v = (v + self.row).reshape(shape).astype(np.float32)
 
-    def bend(self, view: View) -> View:
+    def bend(self, view: RenderedView) -> RenderedView:
         """The view of ``wide`` as it lies in the picture: nearness exactly on the plane of the face that is nearest."""
         x, y = np.rint(self._u).astype(int), np.rint(self._v).astype(int)
         triangle = view.triangle[y, x]
@@ -64,7 +64,7 @@ class Lens:
         nearness = np.where((triangle >= 0) & (on_plane > 0), on_plane, view.nearness[y, x]).astype(np.float32)
         projection = copy.copy(p)
         projection.intrinsics = self.camera
-        return View(projection, nearness, triangle, None if view.light is None else self.bent_light(view.light))
+        return RenderedView(projection, nearness, triangle, None if view.light is None else self.bent_light(view.light))
 
     def bent_light(self, light: Array) -> Array:
         """The light (H', W', 3) uint16 of ``wide`` as it lies in the picture (H, W, 3)."""

@@ -13,7 +13,7 @@ from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse
 from objreg_tools.simulation.params import ColourParams, DepthParams, DepthSensing, StressParams
 from objreg_tools.simulation.rendering.raster import rasterise
-from objreg_tools.simulation.rendering.view import View, draw, in_bands
+from objreg_tools.simulation.rendering.view import RenderedView, draw, in_bands
 from objreg_tools.simulation.sensors.camera import KINECT, ColourSensor
 from objreg_tools.simulation.sensors.depth_sensors import measure, needs_light
 from objreg_tools.simulation.world.model import Symmetry
@@ -24,7 +24,7 @@ ALONE_PX = 96
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class SeenPixels:
     """An object that is visible in an image.
 
     ``xyxy (4,) float32`` px around its visible pixels, half open; ``pixels`` their count; ``visibility`` 0..1 the
@@ -55,12 +55,12 @@ class Rendering:
     true_depth: Array
     rgb: Array | None
     instance: Array
-    seen: tuple[Seen, ...]
+    seen: tuple[SeenPixels, ...]
     T_world_camera: Array
     intrinsics: Intrinsics
 
     @property
-    def objects(self) -> tuple[Seen, ...]:
+    def objects(self) -> tuple[SeenPixels, ...]:
         """The visible objects of the nine classes."""
         return tuple(o for o in self.seen if not o.is_distractor)
 
@@ -87,7 +87,7 @@ def render(
     return truth_of(scene, view, T_world_camera, measured, rgb)
 
 
-def truth_of(scene: Scene, view: View, T_world_camera: Array, measured: Array, rgb: Array | None) -> Rendering:
+def truth_of(scene: Scene, view: RenderedView, T_world_camera: Array, measured: Array, rgb: Array | None) -> Rendering:
     """The measurement, with the truth of a view."""
     nearness, triangle = view.nearness, view.triangle
     true_depth = np.divide(1, nearness, out=np.zeros(nearness.shape, np.float32), where=nearness > 0)
@@ -123,7 +123,7 @@ def _extents(instance, count):  # type: ignore[no-untyped-def]
     return out
 
 
-def see(scene: Scene, instance: Array, T_world_camera: Array, intrinsics: Intrinsics) -> tuple[Seen, ...]:
+def see(scene: Scene, instance: Array, T_world_camera: Array, intrinsics: Intrinsics) -> tuple[SeenPixels, ...]:
     """The truth of every object that has a pixel in the mask ``instance (H, W)``."""
     count = max((o.instance for o in scene.objects), default=0) + 1
     extents = _extents(instance, count)
@@ -132,9 +132,11 @@ def see(scene: Scene, instance: Array, T_world_camera: Array, intrinsics: Intrin
     return tuple(_seen(scene, o, extents[o.instance], T_world_camera, T_camera_world, intrinsics) for o in visible)
 
 
-def _seen(scene: Scene, o: Placed, extent: Array, T_world_camera: Array, T_camera_world: Array, i: Intrinsics) -> Seen:
+def _seen(
+    scene: Scene, o: Placed, extent: Array, T_world_camera: Array, T_camera_world: Array, i: Intrinsics
+) -> SeenPixels:
     alone = outline_pixels(scene, o.instance, T_world_camera, i)
-    return Seen(
+    return SeenPixels(
         instance=o.instance,
         label=o.label,
         is_distractor=o.is_distractor,

@@ -19,7 +19,7 @@ BANDS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class RenderedView:
     """``nearness (H, W) float32`` 1/m, 0 where nothing is; ``triangle (H, W) int32``, -1 there.
 
     ``light (H, W, 3) uint16`` as `shade` has it, or None. ``projection`` knows the camera and the faces' planes.
@@ -51,7 +51,9 @@ class View:
         return np.divide(self.nearness, length, out=np.ones_like(length), where=length > 0)
 
 
-def draw(scene: Scene, T_world_camera: Array, camera: Intrinsics, with_light: bool = True, threads: int = 1) -> View:
+def draw(
+    scene: Scene, T_world_camera: Array, camera: Intrinsics, with_light: bool = True, threads: int = 1
+) -> RenderedView:
     """The view of ``scene`` from the optical frame ``T_world_camera (4, 4)``; ``threads`` changes the time only."""
     shape = (camera.height, camera.width)
     surfaces = scene.surfaces
@@ -68,7 +70,7 @@ def draw(scene: Scene, T_world_camera: Array, camera: Intrinsics, with_light: bo
             shade(projection, nearness, triangle, *light_of, (first, last), light)
 
     in_bands(fill, shape[0], threads)
-    return View(projection, nearness, triangle, light)
+    return RenderedView(projection, nearness, triangle, light)
 
 
 def in_bands(work: Callable[[int, int], None], height: int, threads: int) -> None:

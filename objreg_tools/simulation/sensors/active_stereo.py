@@ -22,7 +22,7 @@ from scipy.special import ndtr
 from objreg_ros.data.checked import Array
 from objreg_tools.simulation.params import StereoParams, StressParams
 from objreg_tools.simulation.rendering.shade import LIGHT_SCALE
-from objreg_tools.simulation.rendering.view import View
+from objreg_tools.simulation.rendering.view import RenderedView
 from objreg_tools.simulation.sensors.fields import JUMP_SHARE, edges, shadows, smooth, wandered
 from objreg_tools.simulation.sensors.noise import warp_field
 
@@ -35,7 +35,7 @@ BLOTCH_WINDOWS = 3
 """Holes are about as many windows wide."""
 
 
-def match(view: View, loss: Array, p: StereoParams, stress: StressParams, seed: int) -> Array:
+def match(view: RenderedView, loss: Array, p: StereoParams, stress: StressParams, seed: int) -> Array:
     """(H, W) float32: the depth in metres that the sensor measures, 0 where none.
 
     ``view`` has light (ValueError else). ``loss (F,)`` is the share of a face that has no depth.
@@ -62,7 +62,7 @@ def window_px(p: StereoParams, fx: float) -> int:
     return int(p.window * fx / p.focal) // 2 * 2 + 1
 
 
-def contrast(view: View, p: StereoParams, window: int) -> Array:
+def contrast(view: RenderedView, p: StereoParams, window: int) -> Array:
     """(H, W) float32: the deviation of grey within the window at every pixel, share of white, dots included."""
     if view.light is None:
         raise ValueError("expected a view with light, by which stereo matches; got one without")

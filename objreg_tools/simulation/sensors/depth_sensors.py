@@ -8,7 +8,7 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_tools.simulation.params import DepthSensing, StereoParams, StressParams, TimeOfFlightParams
 from objreg_tools.simulation.rendering.surfaces import Surfaces
-from objreg_tools.simulation.rendering.view import View, in_bands
+from objreg_tools.simulation.rendering.view import RenderedView, in_bands
 from objreg_tools.simulation.sensors.active_stereo import match
 from objreg_tools.simulation.sensors.noise import DepthSensor
 from objreg_tools.simulation.sensors.time_of_flight import measure_flight
@@ -20,7 +20,7 @@ def needs_light(params: DepthSensing) -> bool:
 
 
 def measure(
-    view: View, surfaces: Surfaces, params: DepthSensing, stress: StressParams, seed: int, threads: int = 1
+    view: RenderedView, surfaces: Surfaces, params: DepthSensing, stress: StressParams, seed: int, threads: int = 1
 ) -> Array:
     """(H, W) float32: what the sensor measures of a view, in metres, 0 where nothing is; ``seed`` draws its noise."""
     if isinstance(params, StereoParams):

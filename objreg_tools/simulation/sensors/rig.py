@@ -24,11 +24,11 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import interpolate, inverse, pose, rotation_angle, rotation_from_vector
 from objreg_tools.simulation.params import ColourParams, DepthParams, DepthSensing, RigParams, StressParams
-from objreg_tools.simulation.rendering.lens import Lens
+from objreg_tools.simulation.rendering.lens import SimulatedLens
 from objreg_tools.simulation.rendering.raster import Projection
 from objreg_tools.simulation.rendering.render import Rendering, photograph, truth_of
 from objreg_tools.simulation.rendering.shade import shade
-from objreg_tools.simulation.rendering.view import View, draw
+from objreg_tools.simulation.rendering.view import RenderedView, draw
 from objreg_tools.simulation.sensors.depth_sensors import measure, needs_light
 from objreg_tools.simulation.world.scene import Scene
 
@@ -67,8 +67,8 @@ class Rig:
         self.T_colour_depth = pose(rotation, 1e-3 * params.misregistration_mm * way)
         self.depth_camera = replace(camera, cx=camera.cx + shift[0], cy=camera.cy + shift[1])
         bent = any(params.distortion)
-        self.lens = Lens(camera, params.distortion) if bent else None
-        self._depth_lens = Lens(self.depth_camera, params.distortion) if bent else None
+        self.lens = SimulatedLens(camera, params.distortion) if bent else None
+        self._depth_lens = SimulatedLens(self.depth_camera, params.distortion) if bent else None
 
     def take(
         self,
@@ -90,7 +90,7 @@ class Rig:
         rgb = photograph(self._light(scene, motion, seconds), colour or ColourParams(), stress, seed, threads)
         return truth_of(scene, draw(scene, T, self.camera, with_light=False), T, measured, rgb)
 
-    def _depth_view(self, scene: Scene, T_world_camera: Array, with_light: bool, threads: int) -> View:
+    def _depth_view(self, scene: Scene, T_world_camera: Array, with_light: bool, threads: int) -> RenderedView:
         if self._depth_lens is None:
             return draw(scene, T_world_camera, self.depth_camera, with_light, threads)
         return self._depth_lens.bend(draw(scene, T_world_camera, self._depth_lens.wide, with_light, threads))

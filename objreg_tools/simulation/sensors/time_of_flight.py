@@ -20,7 +20,7 @@ from scipy.special import ndtr
 from objreg_ros.data.checked import Array
 from objreg_tools.simulation.params import StressParams, TimeOfFlightParams
 from objreg_tools.simulation.rendering.surfaces import Surfaces
-from objreg_tools.simulation.rendering.view import View
+from objreg_tools.simulation.rendering.view import RenderedView
 from objreg_tools.simulation.sensors.fields import JUMP_SHARE, edges, smooth, wandered
 from objreg_tools.simulation.sensors.noise import warp_field
 
@@ -33,7 +33,9 @@ HOLE_PX = 5
 LOSS_PX = 24
 
 
-def measure_flight(view: View, surfaces: Surfaces, p: TimeOfFlightParams, stress: StressParams, seed: int) -> Array:
+def measure_flight(
+    view: RenderedView, surfaces: Surfaces, p: TimeOfFlightParams, stress: StressParams, seed: int
+) -> Array:
     """(H, W) float32: the depth in metres that the sensor measures, 0 where none."""
     shape = view.nearness.shape
     rng = np.random.default_rng([seed, 19])

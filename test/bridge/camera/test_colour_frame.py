@@ -9,7 +9,7 @@ import pytest
 
 from bridge.sample_messages import camera_info, image
 from objreg_ros.bridge.camera import lenses
-from objreg_ros.bridge.camera.colour_frame import Cameras, Seen, depth_image, in_optical_frame, named_registered
+from objreg_ros.bridge.camera.colour_frame import Cameras, SeenFrame, depth_image, in_optical_frame, named_registered
 from objreg_ros.data.images import PointCloud
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 
@@ -30,7 +30,7 @@ OF_COLOUR = info(150.0, 160, 90, frame_id="colour")
 
 def seen(
     cameras: Cameras, frame_id: str = "depth", colour_hw: tuple[int, int] | None = (90, 160), known: bool = True
-) -> Seen:
+) -> SeenFrame:
     metres = np.full((60, 80), 2000, np.uint16)
     metres[:, :20] = 0
     colour = None if colour_hw is None else image(np.zeros((*colour_hw, 3), np.uint8), "rgb8", frame_id="colour")

@@ -8,7 +8,7 @@ import pytest
 
 from bridge.trees import SECOND, moved, panning, said, transform, turned
 from objreg_ros.bridge.camera import frames as module
-from objreg_ros.bridge.camera.frames import FrameTree, Tie, is_world
+from objreg_ros.bridge.camera.frames import FrameTie, FrameTree, is_world
 
 
 def test_two_frames_of_one_tree_are_tied_up_and_down() -> None:
@@ -60,7 +60,7 @@ def test_a_name_that_is_too_long_is_refused(names: tuple[str, str]) -> None:
 
 def test_a_joint_is_followed_between_its_samples() -> None:
     tree = panning(0.0, 10.0, 20.0)
-    assert tree.tie("base", "eye") is Tie.MOVING and tree.between("base", "eye") is None
+    assert tree.tie("base", "eye") is FrameTie.MOVING and tree.between("base", "eye") is None
     assert tree.between("base", "eye", SECOND + SECOND // 20) == pytest.approx(turned(5.0) @ moved(1), abs=1e-9)
     assert tree.between("base", "eye", SECOND + SECOND // 10) == pytest.approx(turned(10.0) @ moved(1), abs=1e-9)
     assert tree.reached_ns("base", "eye") == SECOND + SECOND // 5
@@ -81,7 +81,7 @@ def test_in_a_gap_of_its_samples_a_joint_is_not_guessed() -> None:
 
 def test_what_tf_repeats_is_as_good_as_static_at_any_moment() -> None:
     tree = panning(7.0, 7.0, 7.0)
-    assert tree.tie("base", "eye") is Tie.CONSTANT and tree.reached_ns("base", "eye") is None
+    assert tree.tie("base", "eye") is FrameTie.CONSTANT and tree.reached_ns("base", "eye") is None
     for stamp_ns in (None, 0, 1000 * SECOND):
         assert tree.between("base", "eye", stamp_ns) == pytest.approx(turned(7.0) @ moved(1), abs=1e-9)
 
@@ -89,7 +89,9 @@ def test_what_tf_repeats_is_as_good_as_static_at_any_moment() -> None:
 def test_what_tf_static_says_stays_whatever_tf_says_of_the_same_frames() -> None:
     tree = panning(0.0, 10.0)
     tree.receive_moving(said(transform("head", "eye", moved(5), SECOND)))
-    assert tree.tie("head", "eye") is Tie.STATIC and tree.between("head", "eye") == pytest.approx(moved(1), abs=1e-9)
+    assert tree.tie("head", "eye") is FrameTie.STATIC and tree.between("head", "eye") == pytest.approx(
+        moved(1), abs=1e-9
+    )
 
 
 @pytest.mark.parametrize(

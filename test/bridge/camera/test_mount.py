@@ -6,7 +6,7 @@ import pytest
 
 from bridge.trees import SECOND, moved, panning, said, transform, turned
 from objreg_ros.bridge.camera.frames import FrameTree
-from objreg_ros.bridge.camera.mount import Body, Mount, Seat, nameless_body
+from objreg_ros.bridge.camera.mount import Mount, OdometryBody, Seat, nameless_body
 from objreg_ros.data.frames import Odometry
 
 
@@ -99,23 +99,23 @@ def test_odometry_without_a_child_is_of_the_base_that_carries_the_camera() -> No
 
 def test_a_pose_without_a_child_is_the_cameras_where_its_topic_says_so_and_unknown_where_it_does_not() -> None:
     mount = Mount(None, robot("base_link", "eye"))
-    mount.nameless = Body.CAMERA
+    mount.nameless = OdometryBody.CAMERA
     assert mount.seated(sample("odom", ""), "eye").seat is Seat.ONE_PLACE
-    mount.nameless = Body.UNKNOWN
+    mount.nameless = OdometryBody.UNKNOWN
     assert mount.seated(sample("odom", ""), "eye").seat is Seat.UNKNOWN
 
 
 @pytest.mark.parametrize(
     ("topic", "body"),
     [
-        ("/slam/camera_pose", Body.CAMERA),
-        ("/robot/camera/pose", Body.CAMERA),
-        ("/orb_slam3/pose", Body.CAMERA),
-        ("/robot_pose", Body.BASE),
-        ("/mavros/local_position/pose", Body.BASE),
-        ("/slam/pose", Body.UNKNOWN),
-        ("odom/pose", Body.UNKNOWN),
+        ("/slam/camera_pose", OdometryBody.CAMERA),
+        ("/robot/camera/pose", OdometryBody.CAMERA),
+        ("/orb_slam3/pose", OdometryBody.CAMERA),
+        ("/robot_pose", OdometryBody.BASE),
+        ("/mavros/local_position/pose", OdometryBody.BASE),
+        ("/slam/pose", OdometryBody.UNKNOWN),
+        ("odom/pose", OdometryBody.UNKNOWN),
     ],
 )
-def test_whose_pose_comes_on_a_topic_is_by_its_name(topic: str, body: Body) -> None:
-    assert nameless_body(topic, has_child=False) is body and nameless_body(topic, has_child=True) is Body.BASE
+def test_whose_pose_comes_on_a_topic_is_by_its_name(topic: str, body: OdometryBody) -> None:
+    assert nameless_body(topic, has_child=False) is body and nameless_body(topic, has_child=True) is OdometryBody.BASE

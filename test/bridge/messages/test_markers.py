@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from visualization_msgs.msg import Marker
 
-from objreg_ros.bridge.messages.markers import GOLD, WHITE, Scene
+from objreg_ros.bridge.messages.markers import GOLD, WHITE, MarkerScene
 from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.data.frames import Frame, View
 from objreg_ros.data.images import Intrinsics
@@ -30,7 +30,7 @@ def closure(from_ns: int, to_ns: int) -> LoopClosure:
     return LoopClosure(from_ns=from_ns, to_ns=to_ns, T_from_to=np.eye(4), covariance=np.eye(6), labels=())
 
 
-def ends(scene: Scene, name: str) -> list[float]:
+def ends(scene: MarkerScene, name: str) -> list[float]:
     markers = scene.markers([], 0, "odom").markers
     (lines,) = [marker for marker in markers if marker.ns == name]
     assert lines.type == Marker.LINE_LIST
@@ -38,7 +38,7 @@ def ends(scene: Scene, name: str) -> list[float]:
 
 
 def test_an_edge_runs_from_where_one_keyframe_was_to_where_the_other_was() -> None:
-    scene = Scene()
+    scene = MarkerScene()
     for stamp_ns in range(1, 5):
         scene.see(frame(stamp_ns, x=10.0 * stamp_ns))
     scene.settle(1, [], [])
@@ -48,7 +48,7 @@ def test_an_edge_runs_from_where_one_keyframe_was_to_where_the_other_was() -> No
 
 
 def test_an_edge_to_a_keyframe_of_unknown_place_is_not_drawn() -> None:
-    scene = Scene()
+    scene = MarkerScene()
     scene.see(frame(2, x=1.0))
     scene.settle(2, [closure(1, 2)], [])
     assert ends(scene, "accepted") == []
@@ -56,7 +56,7 @@ def test_an_edge_to_a_keyframe_of_unknown_place_is_not_drawn() -> None:
 
 def test_a_long_run_shows_the_newest_edges(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("objreg_ros.bridge.messages.markers.RECENT_CLOSURES", 2)
-    scene = Scene()
+    scene = MarkerScene()
     for stamp_ns in range(1, 5):
         scene.see(frame(stamp_ns, x=10.0 * stamp_ns))
         scene.settle(stamp_ns, [closure(1, stamp_ns)] if stamp_ns > 1 else [], [])
@@ -64,20 +64,20 @@ def test_a_long_run_shows_the_newest_edges(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_objects_are_shown_with_their_names() -> None:
-    markers = Scene().markers([(7, "cup", np.array([1.0, 2.0, 3.0]))], 5, "odom").markers
+    markers = MarkerScene().markers([(7, "cup", np.array([1.0, 2.0, 3.0]))], 5, "odom").markers
     (name,) = [marker for marker in markers if marker.type == Marker.TEXT_VIEW_FACING]
     assert name.text == "cup 7" and name.header.frame_id == "odom" and name.pose.position.y == 2.0
 
 
 def test_each_marker_has_the_colour_of_its_kind() -> None:
-    for marker in Scene().markers([(7, "cup", np.zeros(3))], 5, "odom").markers:
+    for marker in MarkerScene().markers([(7, "cup", np.zeros(3))], 5, "odom").markers:
         expected = {Marker.TEXT_VIEW_FACING: WHITE, Marker.SPHERE: GOLD}.get(marker.type)
         if expected is not None:
             assert (marker.color.r, marker.color.g, marker.color.b, marker.color.a) == pytest.approx(expected)
 
 
 def test_nothing_is_left_of_a_cleared_scene() -> None:
-    scene = Scene()
+    scene = MarkerScene()
     for stamp_ns in (1, 2):
         scene.see(frame(stamp_ns, x=1.0))
         scene.settle(stamp_ns, [closure(1, 2)], [])
@@ -87,7 +87,7 @@ def test_nothing_is_left_of_a_cleared_scene() -> None:
 
 def test_the_places_of_keyframes_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("objreg_ros.bridge.messages.markers.MOST_PLACES", 3)
-    scene = Scene()
+    scene = MarkerScene()
     for stamp_ns in range(1, 7):
         scene.see(frame(stamp_ns, float(stamp_ns)))
         scene.settle(stamp_ns, [closure(stamp_ns - 1, stamp_ns)], [])

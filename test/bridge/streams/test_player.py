@@ -22,7 +22,7 @@ from objreg_ros.bridge.messages import headers, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.streams import player as player_module
 from objreg_ros.bridge.streams.acknowledgements import IMAGE, Acknowledgements
-from objreg_ros.bridge.streams.player import Item, Player, message_type
+from objreg_ros.bridge.streams.player import PlayedMessage, Player, message_type
 
 PATIENCE = 20.0  # seconds; a test that gets there has failed
 STRING, PICTURE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
@@ -102,18 +102,20 @@ def player(graph: Graph) -> Iterator[Player]:
     made.close()
 
 
-def word(text: str, stamp_ns: int = 0) -> Item:
-    return Item("words", stamp_ns, serialize_message(String(data=text)))
+def word(text: str, stamp_ns: int = 0) -> PlayedMessage:
+    return PlayedMessage("words", stamp_ns, serialize_message(String(data=text)))
 
 
-def picture(stamp_ns: int) -> Item:
-    return Item("image", stamp_ns, serialize_message(Image(header=to_msg.header(stamp_ns, "c"))), IMAGE, stamp_ns)
+def picture(stamp_ns: int) -> PlayedMessage:
+    return PlayedMessage(
+        "image", stamp_ns, serialize_message(Image(header=to_msg.header(stamp_ns, "c"))), IMAGE, stamp_ns
+    )
 
 
 def test_items_are_published_in_their_order_counted_and_told(graph: Graph, player: Player) -> None:
     graph.receive(String, "words", lambda m: m.data)
     assert player.wait_for_listeners(["words"], PATIENCE) == []
-    told: list[Item] = []
+    told: list[PlayedMessage] = []
     items = [word(text) for text in "abc"]
     player.play(items, None, told.append)
     assert graph.wait_for(3) == ["a", "b", "c"] and told == items and player.published == {"words": 3}
@@ -219,7 +221,7 @@ def test_who_comes_late_still_gets_what_was_latched(graph: Graph) -> None:
     player = Player({"words": STRING, "static": STRING}, latched={"static"})
     try:
         for topic in ("words", "static"):
-            player.play([Item(topic, 0, serialize_message(String(data=topic)))], None, print)
+            player.play([PlayedMessage(topic, 0, serialize_message(String(data=topic)))], None, print)
         received: list[str] = []
         for topic in ("words", "static"):
             player.create_subscription(String, topic, lambda m: received.append(m.data), qos.latched(5))

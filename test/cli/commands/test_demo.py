@@ -14,7 +14,7 @@ import pytest
 from recording.sample_folders import CAMERA, records, tum_folder, uncalibrated
 
 from objreg_tools.cli.commands.demo import (
-    Asked,
+    DemoOptions,
     _draw,
     begun_summary,
     calibrated,
@@ -28,7 +28,7 @@ from objreg_tools.recording import open_recording, write_rosbag2
 from objreg_tools.recording.inputs import Inputs, parse_remaps
 from objreg_tools.truth import Truth
 
-ASKED = Asked(
+ASKED = DemoOptions(
     recording=None, model=None, labels=None, params_file=None, changes=(), remaps=(), seconds=None, rate=1.0,
     lossless=False, out=Path("out"),
 )  # fmt: skip

@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from objreg_ros import share
 from objreg_tools.cli import download
 from objreg_tools.cli.commands import fetch_model
-from objreg_tools.cli.commands.fetch_model import Source, checksum, command, fetch, find_source
+from objreg_tools.cli.commands.fetch_model import ModelSource, checksum, command, fetch, find_source
 
 
 class Server(ThreadingHTTPServer):
@@ -85,10 +85,10 @@ def content(tmp_path: Path, server: Server) -> bytes:
     return server.content
 
 
-def source(server: Server, content: bytes, folder: Path) -> Source:
+def source(server: Server, content: bytes, folder: Path) -> ModelSource:
     reference = folder / "reference"
     reference.write_bytes(content)
-    return Source("some.onnx", (server.url,), checksum(reference))
+    return ModelSource("some.onnx", (server.url,), checksum(reference))
 
 
 def test_a_model_arrives_whole(server: Server, content: bytes, tmp_path: Path) -> None:
@@ -128,38 +128,38 @@ def test_a_leftover_longer_than_the_file_is_thrown_away(server: Server, content:
 def test_a_wrong_checksum_is_refused_and_nothing_is_left(server: Server, content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "some.onnx"
     with pytest.raises(ValueError, match=r"expected SHA-256 0000, got [0-9a-f]{64}; it was removed"):
-        fetch(Source("some.onnx", (server.url,), "0000"), path)
+        fetch(ModelSource("some.onnx", (server.url,), "0000"), path)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_web_page_is_no_model(server: Server, tmp_path: Path) -> None:
     server.content = b"<html>Please log in</html>"
     with pytest.raises(ValueError, match="expected an ONNX file"):
-        fetch(Source("some.onnx", (server.url,), sha256(server.content).hexdigest()), tmp_path / "some.onnx")
+        fetch(ModelSource("some.onnx", (server.url,), sha256(server.content).hexdigest()), tmp_path / "some.onnx")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_next_mirror_is_tried_when_one_fails(server: Server, content: bytes, tmp_path: Path) -> None:
     one = source(server, content, tmp_path)
     dead = "http://127.0.0.1:9/some.onnx"
-    fetch(Source(one.file, (dead, *one.urls), one.sha256), tmp_path / "some.onnx")
+    fetch(ModelSource(one.file, (dead, *one.urls), one.sha256), tmp_path / "some.onnx")
     assert (tmp_path / "some.onnx").read_bytes() == content
 
 
 def test_offline_the_error_says_what_was_tried_and_what_to_do(tmp_path: Path) -> None:
     path = tmp_path / "some.onnx"
     with pytest.raises(ValueError, match=r"127\.0\.0\.1:9.*refused.*Are you online\?.*HTTPS_PROXY.*put it at"):
-        fetch(Source("some.onnx", ("https://127.0.0.1:9/some.onnx",)), path)
+        fetch(ModelSource("some.onnx", ("https://127.0.0.1:9/some.onnx",)), path)
     with pytest.raises(
         ValueError, match=r"put it at .*some\.onnx and run this again, which adds its labels\. Try again"
     ):
-        fetch(Source("some.onnx", ("https://127.0.0.1:9/some.onnx",), labels="models/coco.txt"), path)
+        fetch(ModelSource("some.onnx", ("https://127.0.0.1:9/some.onnx",), labels="models/coco.txt"), path)
 
 
 def test_a_missing_page_is_named_with_its_status(server: Server, tmp_path: Path) -> None:
     server.status = 404
     with pytest.raises(ValueError, match=r"some\.onnx: Not Found"):
-        fetch(Source("some.onnx", (server.url,), "00"), tmp_path / "some.onnx")
+        fetch(ModelSource("some.onnx", (server.url,), "00"), tmp_path / "some.onnx")
 
 
 @pytest.mark.parametrize("what", ["unheard-of", "ftp://host/a.onnx", "https://host/page.html", "file:///etc/a.onnx"])
@@ -184,7 +184,7 @@ def test_a_named_model_brings_its_labels(
     server: Server, content: bytes, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     one = source(server, content, tmp_path)
-    named = Source(one.file, one.urls, one.sha256, "models/coco.txt")
+    named = ModelSource(one.file, one.urls, one.sha256, "models/coco.txt")
     monkeypatch.setitem(fetch_model.MODELS, "ssd-mobilenet-v1", named)
     result = CliRunner().invoke(command, ["--folder", str(tmp_path / "here")])
     assert result.exit_code == 0, result.output
@@ -205,7 +205,7 @@ def test_an_address_that_leads_on_to_plain_http_is_refused_without_a_checksum(
     server: Server, content: bytes, tmp_path: Path
 ) -> None:
     with pytest.raises(ValueError, match=r"expected https all the way, or --sha256.*got http://127"):
-        fetch(Source("some.onnx", (server.url,)), tmp_path / "some.onnx")
+        fetch(ModelSource("some.onnx", (server.url,)), tmp_path / "some.onnx")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -213,7 +213,7 @@ def test_the_checksum_that_was_found_is_said_where_none_was_asked_for(
     server: Server, content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(download, "require_safe", lambda *_: None)
-    fetch(Source("some.onnx", (server.url,)), tmp_path / "some.onnx")
+    fetch(ModelSource("some.onnx", (server.url,)), tmp_path / "some.onnx")
     assert f"SHA-256 {checksum(tmp_path / 'some.onnx')}" in capsys.readouterr().out
 
 

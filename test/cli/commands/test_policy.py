@@ -17,7 +17,7 @@ from click.testing import CliRunner
 
 from objreg_tools.cli import access
 from objreg_tools.cli.access import Access, expanded
-from objreg_tools.cli.commands.policy import FILES, Asked, command, enclaves_of, policy_text, write_files
+from objreg_tools.cli.commands.policy import FILES, PolicyOptions, command, enclaves_of, policy_text, write_files
 from objreg_tools.cli.settings import NODES
 
 OURS = {  # by topic the only nodes that may write it
@@ -70,7 +70,7 @@ def test_every_node_that_has_parameters_has_an_access() -> None:
 
 
 @pytest.mark.parametrize("asked", FILES.values(), ids=FILES)
-def test_only_our_nodes_write_what_is_ours(asked: Asked) -> None:
+def test_only_our_nodes_write_what_is_ours(asked: PolicyOptions) -> None:
     found = rules(policy_text(asked))
     for topic, writers in OURS.items():
         (full,) = expanded([topic], asked.namespace, "")
@@ -78,7 +78,7 @@ def test_only_our_nodes_write_what_is_ours(asked: Asked) -> None:
 
 
 @pytest.mark.parametrize("asked", FILES.values(), ids=FILES)
-def test_only_the_operator_calls_what_changes_a_node(asked: Asked) -> None:
+def test_only_the_operator_calls_what_changes_a_node(asked: PolicyOptions) -> None:
     found = rules(policy_text(asked))
     served = {name for verb, name in found if verb == "reply" and name.rpartition("/")[2] in COMMANDS}
     called = {name for name in served if may(found, "request", name)}
@@ -87,7 +87,7 @@ def test_only_the_operator_calls_what_changes_a_node(asked: Asked) -> None:
 
 
 @pytest.mark.parametrize("asked", FILES.values(), ids=FILES)
-def test_no_node_answers_for_another(asked: Asked) -> None:
+def test_no_node_answers_for_another(asked: PolicyOptions) -> None:
     found = rules(policy_text(asked))
     for verb, name in found:
         if verb == "reply" and "*" not in name:
@@ -95,20 +95,20 @@ def test_no_node_answers_for_another(asked: Asked) -> None:
 
 
 def test_sources_write_what_a_camera_does_and_nothing_of_ours() -> None:
-    written = set(enclaves_of(Asked())["sources"]["camera"].writes)
+    written = set(enclaves_of(PolicyOptions())["sources"]["camera"].writes)
     assert {"image", "depth/image", "points", "camera_info", "odom", "imu", "tf", "tf_static", "masks"} <= written
     assert not written & access.OWN
 
 
 def test_a_remapped_topic_is_allowed_where_it_is_and_no_longer_where_it_was() -> None:
-    found = rules(policy_text(Asked("/robot1", {"image": "/kinect/rgb"})))
+    found = rules(policy_text(PolicyOptions("/robot1", {"image": "/kinect/rgb"})))
     assert may(found, "subscribe", "/kinect/rgb") == {"detector", "segmenter"}
     assert may(found, "publish", "/kinect/rgb") == {"sources"}
     assert not may(found, "subscribe", "/robot1/image")
 
 
 def test_robots_of_one_registrar_are_read_and_their_paths_written() -> None:
-    found = rules(policy_text(Asked(robots={"r1": ("front", "rear"), "r2": ()})))
+    found = rules(policy_text(PolicyOptions(robots={"r1": ("front", "rear"), "r2": ()})))
     for topic in ("/r1/front/keyframes", "/r1/rear/labels", "/r2/keyframes"):
         assert may(found, "subscribe", topic) == {"registrar"}
         assert not may(found, "publish", topic)
@@ -122,7 +122,7 @@ def test_accesses_add_up_without_doubles() -> None:
 def test_the_command_takes_names_as_the_nodes_do() -> None:
     words = ["--namespace", "robot1", "--remap", "image:=/rgb", "--robot", "r1 front", "--exchange", "/fleet"]
     shown = CliRunner().invoke(command, [*words, "--source", "kinect", "--enclaves", "/lab"])
-    asked = Asked("/robot1", {"image": "/rgb"}, {"r1": ("front",)}, "/fleet", ("kinect",), "/lab")
+    asked = PolicyOptions("/robot1", {"image": "/rgb"}, {"r1": ("front",)}, "/fleet", ("kinect",), "/lab")
     assert shown.output == policy_text(asked)
 
 
@@ -160,7 +160,7 @@ def test_a_policy_fits_the_schema_of_sros2(repository: Path, sros2: Any, name: s
 
 
 def test_what_does_not_fit_the_schema_is_refused(tmp_path: Path, sros2: Any) -> None:
-    (tmp_path / "p.xml").write_text(policy_text(Asked()).replace('publish="ALLOW"', 'publish="PERHAPS"'))
+    (tmp_path / "p.xml").write_text(policy_text(PolicyOptions()).replace('publish="ALLOW"', 'publish="PERHAPS"'))
     with pytest.raises(RuntimeError, match="PERHAPS"):
         sros2.load_policy(tmp_path / "p.xml")
 

@@ -14,7 +14,7 @@ from rclpy.executors import ExternalShutdownException
 from recording.sample_folders import STEP_NS, humble_bag, noetic_bag, records, robot_bag, tum_folder
 
 from objreg_ros.bridge.streams.acknowledgements import DEPTH, IMAGE, ORDER, Acknowledgements
-from objreg_ros.bridge.streams.player import Item
+from objreg_ros.bridge.streams.player import PlayedMessage
 from objreg_tools.cli.commands.replay import command, playable_names
 from objreg_tools.recording import open_recording, write_rosbag2
 from objreg_tools.recording.inputs import Inputs, choose_inputs
@@ -35,7 +35,7 @@ class Stage:
         self.clock = self.closed = self.shut_down = False
         self.asked: list[tuple[list[str], float]] = []
         self.deaf: list[str] = []
-        self.plays: list[tuple[str, float | None, list[Item]]] = []
+        self.plays: list[tuple[str, float | None, list[PlayedMessage]]] = []
         self.most = 1  # plays, and then somebody presses Ctrl-C
         self.published: Counter[str] = Counter()
         self.lost: list[int] = []
@@ -60,17 +60,23 @@ class Stage:
         self.acknowledgements = Acknowledgements(ORDER)
         return self.acknowledgements
 
-    def play(self, items: Iterable[Item], rate: float | None, on_item: Callable[[Item], None]) -> None:
+    def play(
+        self, items: Iterable[PlayedMessage], rate: float | None, on_item: Callable[[PlayedMessage], None]
+    ) -> None:
         self._take("paced", rate, items, on_item)
 
-    def play_lossless(self, items: Iterable[Item], patience: float, on_item: Callable[[Item], None]) -> None:
+    def play_lossless(
+        self, items: Iterable[PlayedMessage], patience: float, on_item: Callable[[PlayedMessage], None]
+    ) -> None:
         self._take("lossless", patience, items, on_item)
         for item in self.plays[-1][2]:
             if item.kind == IMAGE:
                 self.acknowledgements.receive("detector published", item.header_ns)
         self.acknowledgements.receive("segmenter dropped unmatched", 0)
 
-    def _take(self, how: str, number: float | None, items: Iterable[Item], on_item: Callable[[Item], None]) -> None:
+    def _take(
+        self, how: str, number: float | None, items: Iterable[PlayedMessage], on_item: Callable[[PlayedMessage], None]
+    ) -> None:
         if len(self.plays) == self.most:
             raise KeyboardInterrupt
         self.plays.append((how, number, list(items)))

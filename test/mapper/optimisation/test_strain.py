@@ -9,7 +9,7 @@ import pytest
 from mapper.bent import bent, closure, distances, odometry, square
 from objreg_mapper.optimisation.strain import LIMIT, Strain
 from objreg_mapper.params import MapperParams
-from objreg_mapper.pose_graph import PoseGraph, Summary
+from objreg_mapper.pose_graph import MapSummary, PoseGraph
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose
@@ -34,7 +34,7 @@ def lies(count: int, metres: float) -> list[LoopClosure]:
     return [closure(TRUE, k, k + LAP, pose(np.eye(3), shift)) for k, shift in zip(first, moved, strict=True)]
 
 
-def mapped(told: list[Array], closures: list[LoopClosure], params: MapperParams) -> tuple[PoseGraph, Summary]:
+def mapped(told: list[Array], closures: list[LoopClosure], params: MapperParams) -> tuple[PoseGraph, MapSummary]:
     graph = PoseGraph(params)
     for one in odometry(told):
         graph.add_odometry(one)

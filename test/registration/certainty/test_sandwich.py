@@ -10,7 +10,7 @@ from objreg_ros import sensor
 from objreg_ros.data.checked import Array
 from objreg_ros.registration.certainty import sandwich
 from objreg_ros.registration.certainty.sandwich import FREEDOMS, _spread, information, systematic_depth_error_of_step
-from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
+from objreg_ros.registration.kernels.closest_points import IndexedSurface, prepare_surface
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +31,7 @@ def corner(step: float) -> tuple[Array, Array]:
     return points + np.array([0.0, 0.0, 2.0]), normals
 
 
-def grid_of(xyz: Array, normals: Array) -> Surface:
+def grid_of(xyz: Array, normals: Array) -> IndexedSurface:
     return prepare_surface(xyz.astype(np.float32), normals.astype(np.float32), 0.05, 0.2)
 
 

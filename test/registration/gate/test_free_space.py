@@ -11,7 +11,7 @@ from objreg_ros.registration.gate import free_space
 from objreg_ros.registration.gate.verdict import refuse
 from registration.samples import candidate
 
-LIMITS = free_space.Limits(violations=0.15, certain=0.03)
+LIMITS = free_space.FreeSpaceLimits(violations=0.15, certain=0.03)
 
 
 def test_a_refusal_says_how_much_violates_free_space_and_how_much_may() -> None:

@@ -14,8 +14,8 @@ def test_no_limit_changes_unnoticed() -> None:
             odds=75.0,
             translation_m=5.0,
             gravity_sigmas=3.5,
-            free_space=free_space.Limits(violations=0.15, certain=0.03),
-            surroundings=surroundings.Limits(tested=600, inliers=0.35, correlation_loss=0.25, score=0.25),
+            free_space=free_space.FreeSpaceLimits(violations=0.15, certain=0.03),
+            surroundings=surroundings.SurroundingsLimits(tested=600, inliers=0.35, correlation_loss=0.25, score=0.25),
             score_margin=0.1,
             odometry_sigmas=4.0,
         )

@@ -15,7 +15,7 @@ from objreg_ros.registration.gate.verdict import refuse
 from registration.gate.samples import CUP
 from registration.samples import candidate
 
-LIMITS = surroundings.Limits(tested=600, inliers=0.35, correlation_loss=0.25, score=0.25)
+LIMITS = surroundings.SurroundingsLimits(tested=600, inliers=0.35, correlation_loss=0.25, score=0.25)
 SEEN = Verification(inliers=0.9, violations=0.0, occluded=0.0, correlation=0.6, tested=9000, score=0.8)
 
 

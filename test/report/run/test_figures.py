@@ -103,13 +103,13 @@ def test_names_that_would_cover_each_other_are_moved_apart() -> None:
 def test_the_ground_is_the_plane_of_the_way() -> None:
     angles = np.linspace(0, 2 * np.pi, 50)
     xyz = np.column_stack([2 * np.cos(angles), np.full(50, 0.7), np.sin(angles)])
-    np.testing.assert_allclose(np.ptp(figures.Ground(xyz).flat(xyz), axis=0), [4.0, 2.0], atol=0.02)
+    np.testing.assert_allclose(np.ptp(figures.GroundAxes(xyz).flat(xyz), axis=0), [4.0, 2.0], atol=0.02)
 
 
 def test_the_ground_of_a_long_way_needs_no_more_memory_than_the_way() -> None:
     xyz = np.random.default_rng(0).normal(size=(5000, 3))
     tracemalloc.start()
-    ground = figures.Ground(xyz)
+    ground = figures.GroundAxes(xyz)
     assert tracemalloc.get_traced_memory()[1] < 5e6
     tracemalloc.stop()
-    assert ground.flat(xyz).shape == (5000, 2) and figures.Ground(xyz[:1]).axes.shape == (2, 3)
+    assert ground.flat(xyz).shape == (5000, 2) and figures.GroundAxes(xyz[:1]).axes.shape == (2, 3)

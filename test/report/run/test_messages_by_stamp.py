@@ -13,7 +13,7 @@ from recording.sample_folders import CAMERA, STEP_NS, records, uncalibrated
 from objreg_ros.bridge.messages import camera_from_msg, headers
 from objreg_tools.recording import Record, open_recording, write_rosbag2
 from objreg_tools.recording.rosbag import messages
-from objreg_tools.report.run.messages_by_stamp import SLOP_NS, Cameras, MessagesByStamp
+from objreg_tools.report.run.messages_by_stamp import SLOP_NS, CamerasByStamp, MessagesByStamp
 
 FIRST_NS = 10**9
 
@@ -64,7 +64,7 @@ def test_the_camera_is_the_newest_calibrated_one_of_a_moment_or_else_the_first(t
     told = [uncalibrated(1), info(20, 50.0), info(30, 50.0), info(40, 60.0), uncalibrated(50)]
     write_rosbag2(tmp_path / "bag", told)
     with open_recording(tmp_path / "bag") as recording:
-        cameras = Cameras(recording, "/camera_info")
+        cameras = CamerasByStamp(recording, "/camera_info")
         found = [camera_from_msg.intrinsics(cameras.at(stamp)).fx for stamp in (5, 20, 39, 40, 99)]
     assert found == [50.0, 50.0, 50.0, 60.0, 60.0]
 
@@ -72,4 +72,4 @@ def test_the_camera_is_the_newest_calibrated_one_of_a_moment_or_else_the_first(t
 def test_without_a_calibrated_camera_info_there_is_no_camera(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", [uncalibrated(1)])
     with open_recording(tmp_path / "bag") as recording:
-        assert Cameras(recording, "/camera_info").at(5) is None and Cameras(recording, None).at(5) is None
+        assert CamerasByStamp(recording, "/camera_info").at(5) is None and CamerasByStamp(recording, None).at(5) is None

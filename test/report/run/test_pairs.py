@@ -49,3 +49,12 @@ def test_false_constraints_are_looked_at_first_and_what_was_not_tried_last() -> 
     told["refusals"][1]["T_from_to"] = np.eye(4).tolist()
     order = [pair.key for pair in by_interest(pairs_of(RunSummary.of("walk", told, TRUTH)))]
     assert order == ["c4", "c0", "c1", "c2", "c3", "r1", "r2", "r0"]
+
+
+def test_a_pair_of_two_cameras_names_them_with_their_robots() -> None:
+    told = summary()
+    told["constraints"][0] |= {"from_robot": "a", "to_robot": "b", "from_frame_id": "front", "to_frame_id": "front"}
+    told["constraints"][1] |= {"from_frame_id": "front", "to_frame_id": "rear"}
+    first, second, third, *_ = pairs_of(RunSummary.of("run", told, TRUTH))
+    assert first.text.startswith("a/front, then b/front") and second.text.startswith("front, then rear")
+    assert ", then " not in third.text

@@ -12,21 +12,21 @@ from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import View
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_tools.report.run.revisits import Seen, closed, overlap, recall_by_view_change, revisit_of, revisits
+from objreg_tools.report.run.revisits import SeenPlace, closed, overlap, recall_by_view_change, revisit_of, revisits
 from objreg_tools.truth import Truth
 
 CAMERA = Intrinsics(fx=150.0, fy=150.0, cx=79.5, cy=59.5, width=160, height=120)
 SECOND = 1_000_000_000
 
 
-def wall(seconds: float, x: float = 0.0, yaw_deg: float = 0.0) -> Seen:
+def wall(seconds: float, x: float = 0.0, yaw_deg: float = 0.0) -> SeenPlace:
     """What a camera at (x, 0, 0), turned about its y axis, sees of the wall z = 2 m."""
     T = pose(rotation_from_vector(np.array([0.0, np.radians(yaw_deg), 0.0])), np.array([x, 0.0, 0.0]))
     v, u = np.mgrid[:120, :160]
     rays = np.stack([(u - CAMERA.cx) / CAMERA.fx, (v - CAMERA.cy) / CAMERA.fy, np.ones(u.shape)], axis=-1)
     z = 2.0 / (rays @ T[2, :3])
     xyz = np.where(z[..., None] > 0, rays * z[..., None], np.nan).astype(np.float32)
-    return Seen(int(seconds * SECOND), View(xyz=xyz, grey=None, intrinsics=CAMERA), T)
+    return SeenPlace(int(seconds * SECOND), View(xyz=xyz, grey=None, intrinsics=CAMERA), T)
 
 
 def test_a_view_overlaps_itself_wholly_and_its_back_not_at_all() -> None:
@@ -58,7 +58,7 @@ def test_a_revisit_is_of_the_moment_that_overlaps_most_or_of_none() -> None:
     assert revisit_of(wall(5), [wall(0, x=9.0)]) is None and revisit_of(wall(5), []) is None
 
 
-def closure(a: Seen, b: Seen, off: float = 0.0) -> LoopClosure:
+def closure(a: SeenPlace, b: SeenPlace, off: float = 0.0) -> LoopClosure:
     T = inverse(a.T_world_camera) @ b.T_world_camera
     T[0, 3] += off
     return LoopClosure(from_ns=a.stamp_ns, to_ns=b.stamp_ns, T_from_to=T, covariance=np.eye(6), labels=())

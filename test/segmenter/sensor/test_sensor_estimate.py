@@ -19,7 +19,7 @@ from objreg_ros.segmenter.sensor.sensor_estimate import (
     Lag,
     PictureMotion,
     SensorEstimate,
-    Turn,
+    TurnSample,
     fit_lag,
 )
 from objreg_ros.sensor import depth_sigma
@@ -95,11 +95,11 @@ def test_too_few_frames_tell_no_lag() -> None:
     assert estimate_of(stream(25.0, count=20)).lag is None
 
 
-def turns(lag_ms: float, scatter: float, count: int = 300) -> list[Turn]:
+def turns(lag_ms: float, scatter: float, count: int = 300) -> list[TurnSample]:
     rng = np.random.default_rng(1)
     velocity = 0.3 * rng.normal(size=(count, 2))
     offset = np.array([0.01, -0.004]) - 1e-3 * lag_ms * velocity + scatter * rng.normal(size=(count, 2))
-    return [Turn(k / RATE, velocity[k], offset[k]) for k in range(count)]
+    return [TurnSample(k / RATE, velocity[k], offset[k]) for k in range(count)]
 
 
 def test_a_wrong_calibration_is_no_lag() -> None:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_tools.simulation.rendering.lens import Lens
+from objreg_tools.simulation.rendering.lens import SimulatedLens
 from objreg_tools.simulation.rendering.light import looking
 from objreg_tools.simulation.rendering.view import draw
 from objreg_tools.simulation.sensors.camera import KINECT, LENSES
@@ -21,7 +21,7 @@ K = np.array([[KINECT.fx, 0, KINECT.cx], [0, KINECT.fy, KINECT.cy], [0, 0, 1]])
 @pytest.mark.parametrize("name", LENSES)
 def test_a_bent_picture_undistorts_to_the_plain_one(name: str) -> None:
     scene = wall(1.0, printed())
-    lens = Lens(KINECT, LENSES[name])
+    lens = SimulatedLens(KINECT, LENSES[name])
     straight = draw(scene, AHEAD, KINECT).light
     bent = lens.bend(draw(scene, AHEAD, lens.wide)).light
     assert straight is not None and bent is not None and bent.shape == straight.shape
@@ -39,7 +39,7 @@ def test_a_bent_picture_undistorts_to_the_plain_one(name: str) -> None:
 def test_depth_lies_on_the_floor_along_the_ray_of_every_pixel(name: str) -> None:
     floor = Scene((), (box((60.0, 60.0, 1.0), plain(128)).moved(z=-1.0),), (), AMBIENT)
     T = looking(np.array([0, 0, 1.0]), np.array([0, 2.0, 0.0]), np.array([0, 0, 1.0]))
-    lens = Lens(KINECT, LENSES[name])
+    lens = SimulatedLens(KINECT, LENSES[name])
     nearness = lens.bend(draw(floor, T, lens.wide)).nearness
     hit = nearness > 0.2
     points = np.dstack([lens.rays, np.ones(hit.shape)])[hit] / nearness[hit][:, None]
@@ -48,7 +48,7 @@ def test_depth_lies_on_the_floor_along_the_ray_of_every_pixel(name: str) -> None
 
 
 def test_the_rays_are_those_that_opencv_projects_into_the_pixels() -> None:
-    lens = Lens(KINECT, LENSES["webcam"])
+    lens = SimulatedLens(KINECT, LENSES["webcam"])
     at = [(0, 0), (479, 639), (100, 500)]
     rays = np.array([[*lens.rays[p], 1.0] for p in at])
     seen = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), K, np.array(LENSES["webcam"]))[0].reshape(-1, 2)
@@ -58,4 +58,4 @@ def test_the_rays_are_those_that_opencv_projects_into_the_pixels() -> None:
 @pytest.mark.parametrize("distortion", [(-3.0, 0.0, 0.0, 0.0), (0.0, -40.0, 0.0, 0.0, 0.0)])
 def test_a_lens_that_folds_the_picture_is_refused(distortion: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="expected one that gives every pixel of 640x480 a ray of its own, got"):
-        Lens(KINECT, distortion)
+        SimulatedLens(KINECT, distortion)
