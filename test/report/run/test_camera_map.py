@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -104,3 +105,15 @@ def test_without_the_solver_the_track_is_as_it_is_and_says_why(monkeypatch: pyte
     made = mapped(tracked(0, 70), closure(20, 80), closure(25, 85))
     assert "expected gtsam" in made.unsolved and (made.sessions, len(made.frames)) == (1, 70)
     np.testing.assert_allclose(made.frames[-1].T_map_camera, made.frames[-1].T_session_camera, atol=2e-3)
+
+
+def test_closures_of_one_robot_are_on_its_map_by_whatever_name_and_those_between_robots_are_not() -> None:
+    ties = [closure(k, k + 60) for k in (5, 20, 40, 55)]
+    named = [replace(tie, from_robot="a", to_robot="a") for tie in ties]
+    between = [replace(tie, from_robot="a", to_robot="b") for tie in ties]
+    assert errors_m(mapped(tracked(0), *named)) == pytest.approx(errors_m(mapped(tracked(0), *ties)))
+    before, after = errors_m(mapped(tracked(0), *between))
+    assert before == pytest.approx(after)
+    lie = replace(closure(5, 65, metres=30.0), from_robot="a", to_robot="a")
+    (pruned,) = mapped(tracked(0), *named, lie).pruned
+    assert pruned.from_robot == "a" and pruned.T_from_to[0, 3] == lie.T_from_to[0, 3]
