@@ -15,6 +15,8 @@ from functools import partial
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
+from objreg_ros import extra
+
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 
@@ -45,12 +47,7 @@ class Done(Generic[Item, Value]):
 
 def require_dask() -> ModuleType:
     """Dask's distributed; ValueError that names the extra where it is not installed."""
-    try:
-        import distributed
-    except ModuleNotFoundError as absent:
-        problem = "expected Dask's distributed, found none; pip install 'objreg_ros[batch]' brings it"
-        raise ValueError(problem) from absent
-    return distributed
+    return extra.load("distributed", "batch", "work over processes by Dask")
 
 
 def cores() -> int:

@@ -288,3 +288,14 @@ def test_a_frame_tells_its_robot_by_the_longest_name() -> None:
     robots = ["r1", "fleet", "fleet/r1"]
     told = [robot_of(frame_id, robots) for frame_id in ("r1/camera", "fleet/r1/camera", "r10/camera", "camera")]
     assert told == ["r1", "fleet/r1", "", ""]
+
+
+def test_a_refusal_of_a_closure_has_every_field_that_they_share() -> None:
+    closure = closures.LoopClosure(
+        from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",), evidence={"odds": 3.0},
+        from_frame_id="front", to_frame_id="rear", from_session=4, to_session=5, from_robot="a", to_robot="b",
+    )  # fmt: skip
+    one = closures.refused(closure, closures.Reason.SLACK, "along x")
+    assert (one.reason, one.detail) == (closures.Reason.SLACK, "along x")
+    shared = {field.name for field in fields(one)} & {field.name for field in fields(closure)}
+    assert len(shared) == 10 and all(getattr(one, name) is getattr(closure, name) for name in shared)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import field, fields
 from enum import Enum
 
 import numpy as np
@@ -144,6 +144,12 @@ class LoopClosure:
         """How far objects went that stood elsewhere before, m by label, from the evidence (see `MOVED`)."""
         found = ((MOVED.fullmatch(name), metres) for name, metres in self.evidence.items())
         return {name["label"]: metres for name, metres in found if name}
+
+
+def refused(closure: LoopClosure, reason: Reason, detail: str) -> Rejected:
+    """The refusal of what would have been this closure, with every field that the two have in common."""
+    shared = {field.name: getattr(closure, field.name) for field in fields(Rejected) if hasattr(closure, field.name)}
+    return Rejected(reason=reason, detail=detail, **shared)
 
 
 @data_type

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import LoopClosure, ObjectMatch, Observation, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, ObjectMatch, Observation, Reason, Rejected, refused
 from objreg_ros.data.frames import UNNAMED
 from objreg_ros.geometry import transform
 from objreg_ros.memory.landmarks import Link
@@ -82,22 +82,7 @@ class WaitingClosure:
 
     def refused(self, refusal: Refusal) -> Rejected:
         """The refusal that it comes to."""
-        reason, detail = refusal
-        closure = self.closure
-        return Rejected(
-            reason=reason,
-            from_ns=closure.from_ns,
-            to_ns=closure.to_ns,
-            detail=detail,
-            T_from_to=closure.T_from_to,
-            evidence=closure.evidence,
-            from_frame_id=closure.from_frame_id,
-            to_frame_id=closure.to_frame_id,
-            from_session=closure.from_session,
-            to_session=closure.to_session,
-            from_robot=closure.from_robot,
-            to_robot=closure.to_robot,
-        )
+        return refused(self.closure, *refusal)
 
 
 def rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, target: Keyframe | None = None) -> Rejected:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from objreg_ros import extra
 from objreg_ros.whole_file import whole_file
 from objreg_tools.report.batch.batch_rows import Row
 from objreg_tools.truth import FALSE, within
@@ -26,13 +27,8 @@ GROUP = 20_000  # rows that are held before they are written
 
 def require_pyarrow() -> ModuleType:
     """pyarrow; ValueError that names the extra where it is not installed."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ModuleNotFoundError as absent:
-        lacking = "expected pyarrow, which writes Parquet, found none; pip install 'objreg_ros[batch]' brings it"
-        raise ValueError(lacking) from absent
-    return pyarrow
+    extra.load("pyarrow.parquet", "batch", "Parquet")
+    return extra.load("pyarrow", "batch", "Parquet")
 
 
 @contextmanager

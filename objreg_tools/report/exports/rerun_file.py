@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from objreg_ros import extra
 from objreg_ros.whole_file import folder_for, put_whole
 from objreg_tools.report.exports.run_scene import ClosureEdge, RunScene, SceneFrame
 
@@ -28,12 +29,7 @@ QUALITY = 80  # of a JPEG
 
 def require_rerun() -> ModuleType:
     """The SDK; ValueError that names the extra where it is not installed."""
-    try:
-        import rerun
-    except ModuleNotFoundError as absent:
-        lacking = "--rerun: expected the Rerun SDK, found none; pip install 'objreg_ros[rerun]' brings it"
-        raise ValueError(lacking) from absent
-    return rerun
+    return extra.load("rerun", "rerun", "--rerun")
 
 
 def write_rerun(file: Path, scene: RunScene) -> int:

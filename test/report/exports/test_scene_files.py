@@ -23,9 +23,7 @@ def test_only_what_is_asked_for_is_written_and_told(tmp_path: Path) -> None:
 
 def test_without_the_sdk_the_error_names_the_extra_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(
-        ValueError, match=r"--rerun: expected the Rerun SDK, found none; pip install 'objreg_ros\[rerun]'"
-    ):
+    with pytest.raises(ValueError, match=r"--rerun: expected rerun, got none; pip install 'objreg_ros\[rerun]'"):
         SceneFiles(rerun=Path("run.rrd"))
 
 
