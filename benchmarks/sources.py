@@ -24,7 +24,6 @@ from objreg_ros.geometry import pose, rotation_between
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.depth_to_colour import DepthToColour
-from objreg_ros.segmenter.sensor.organise import organise
 from objreg_tools.offline.line import run_offline
 from objreg_tools.offline.stages import Stages
 from objreg_tools.recording import Recording, open_recording
@@ -198,7 +197,7 @@ def _frames(recording: Recording, asked: DetectorParams, reading: Reading) -> tu
     collector, segmenter = Collector(), Segmenter(SegmenterParams())
     if not reading.registered:
         segmenter.sensor.depth_to_colour = Unturned()
-    run_offline(stills(recording, inputs, reading.every), Stages(detector, segmenter, collector, organise), inputs)
+    run_offline(stills(recording, inputs, reading.every), Stages(detector, segmenter, collector), inputs)
     return collector.frames, detector.seen
 
 

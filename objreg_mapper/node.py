@@ -29,11 +29,11 @@ from objreg_ros.bridge.messages import motion_from_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.params import ManagedParams
+from objreg_ros.bridge.node.robots import prefixes_of
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.process.intra_process import IntraProcessBus
 from objreg_ros.bridge.streams.closures_in import ClosuresIn
 from objreg_ros.bridge.streams.map_announcements import MapAnnouncements
-from objreg_ros.bridge.streams.robots import prefixes_of
 from objreg_ros.data.closures import LoopClosure, Moments, Robots, may_be_same
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.whole_file import write_whole

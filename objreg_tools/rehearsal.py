@@ -14,10 +14,9 @@ from objreg_ros.data.images import ColourImage, DepthImage, Detections
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.sensor.organise import organise
 from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
 from objreg_ros.segmenter.sensor.view import reduced_view, step_for
-from objreg_tools.offline.line import Timing, run_offline
+from objreg_tools.offline.line import LineParams, run_offline
 from objreg_tools.offline.run import Run
 from objreg_tools.offline.stages import Stages
 from objreg_tools.recording.inputs import Inputs
@@ -86,9 +85,9 @@ def rehearse(
     source: Recording, inputs: Inputs, frames: int = FRAMES, on_frame: Callable[[int], None] = lambda frames: None
 ) -> Run:
     """The run of the first ``frames`` of a recording. ``on_frame`` as in `run_offline`."""
-    stages = Stages(SeesNothing(), _CutsNothing(), _ClosesNothing(), organise)
-    timing = Timing(frames=frame_tree(source, camera_frame(source, inputs)))
-    return run_offline(_beginning(source, inputs, frames), stages, inputs, timing, on_frame=on_frame)
+    stages = Stages(SeesNothing(), _CutsNothing(), _ClosesNothing())
+    params = LineParams(frames=frame_tree(source, camera_frame(source, inputs)))
+    return run_offline(_beginning(source, inputs, frames), stages, inputs, params, on_frame=on_frame)
 
 
 def _beginning(source: Recording, inputs: Inputs, frames: int) -> Iterator[Record]:

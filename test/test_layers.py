@@ -31,7 +31,7 @@ FREE_BRIDGE = (
     *("bridge.camera.calibration", "bridge.camera.calibration_files", "bridge.camera.camera_checks"),
     *("bridge.camera.camera_stream", "bridge.camera.chains", "bridge.camera.colour_frame", "bridge.camera.frames"),
     *("bridge.camera.lenses", "bridge.camera.mount", "bridge.camera.pace", "bridge.camera.registered_depth"),
-    *("bridge.camera.travel", "bridge.streams.clock_monitor", "bridge.streams.sync"),
+    *("bridge.camera.travel", "bridge.streams.clock_monitor", "bridge.streams.sync", "bridge.streams.matching"),
 )
 CORE = ("limits", "sensor", "whole_file", "terminal", "extra", "data", "lens", "geometry", "params", "share")
 DRIVERS = tuple(f"objreg_tools.{name}" for name in ("offline", "rehearsal", "truth", "workers", "report"))
@@ -130,7 +130,7 @@ def allowed_in_tools(importer: str, imported: str) -> bool:
         return below(imported, "objreg_tools.simulation", "objreg_tools.recording", "data", "geometry", "params")
     return below(
         imported,
-        *(*STAGES, "objreg_mapper", "registration", "keyframes", "memory", "plausibility"),
+        *(*STAGES, "objreg_mapper", "pipeline", "registration", "keyframes", "memory", "plausibility"),
         *(*CORE, "objreg_tools.recording", *DRIVERS, *FREE_BRIDGE),
     ) and not imported.endswith(".node")
 
@@ -154,8 +154,10 @@ def allowed_in_ros(importer: str, imported: str) -> bool:
         )
     if stage in STAGES and importer.endswith(".node"):
         return below(imported, stage, "data", "bridge", "share", "plausibility") or (
-            stage == "registrar" and floor(imported) is not None
+            (stage == "segmenter" and imported == "pipeline") or (stage == "registrar" and floor(imported) is not None)
         )
+    if importer == "pipeline":
+        return below(imported, "segmenter", "data", *FREE_BRIDGE) and not imported.endswith(".node")
     if importer == "keyframes.node":
         return below(imported, "keyframes", "memory", "registration", "data", "bridge", "share")
     if floor(importer) is not None:

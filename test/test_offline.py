@@ -15,6 +15,7 @@ from recording.sample_folders import CAMERA, records, uncalibrated
 from recording.vision import detected
 from simple_rooms import OneBox, simple_rooms
 
+from objreg_ros import pipeline
 from objreg_ros.bridge.camera.frames import FrameTree
 from objreg_ros.bridge.messages import headers, motion_from_msg
 from objreg_ros.data.closures import LoopClosure, Rejected
@@ -22,11 +23,12 @@ from objreg_ros.data.frames import Frame
 from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.geometry import back_project, pose, rotation_angle, rotation_from_vector
+from objreg_ros.geometry import back_project, pose, quaternion_from_rotation, rotation_angle, rotation_from_vector
+from objreg_ros.params import FramesParams
+from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.segmenter.sensor.organise import organise
 from objreg_ros.segmenter.sensor.sensor_estimate import Lag, SensorEstimate
-from objreg_tools.offline.line import Timing, as_sent, run_offline
+from objreg_tools.offline.line import LineParams, as_sent, run_offline
 from objreg_tools.recording import Record
 from objreg_tools.recording.inputs import Inputs
 from objreg_tools.recording.mounts import TRANSFORMS
@@ -96,7 +98,7 @@ def test_a_picture_whose_recorded_detections_are_missing_or_broken_is_dropped_wi
 
 def test_colour_can_be_left_out() -> None:
     stages, chain = simple_rooms()
-    run = run_offline(records(3), stages, INPUTS, Timing(colour=False))
+    run = run_offline(records(3), stages, INPUTS, LineParams(SegmenterNodeParams(colour=False)))
     assert run.frames == run.detections == 3
     assert [frame.objects[0].rgb for frame in chain.frames] == [None] * 3
 
@@ -130,14 +132,14 @@ def at_30_hz(count: int, depth_late_ms: float = 0.0) -> list[Record]:
 @pytest.mark.parametrize("depth_late_ms", [0.0, 9.0, 15.0, -9.0])
 def test_pictures_that_come_faster_than_they_are_wanted_are_surplus_with_their_depth(depth_late_ms: float) -> None:
     stages, chain = simple_rooms()
-    run = run_offline(at_30_hz(12, depth_late_ms), stages, INPUTS, Timing(max_rate=10.0))
+    run = run_offline(at_30_hz(12, depth_late_ms), stages, INPUTS, LineParams(max_rate=10.0))
     taken = [round((frame.stamp_ns / MS - 1000 - depth_late_ms) * 30 / 1000) for frame in chain.frames]
     assert taken == [0, 3, 6, 9] and run.dropped == {"depth_surplus": 8}
 
 
 def test_surplus_pictures_are_not_decoded() -> None:
     stages, _ = simple_rooms()
-    run = run_offline(at_30_hz(12), stages, INPUTS, Timing(max_rate=10.0))
+    run = run_offline(at_30_hz(12), stages, INPUTS, LineParams(max_rate=10.0))
     assert len(run.stage_s["detect"]) == len(run.stage_s["segment"]) == 4
 
 
@@ -186,14 +188,17 @@ def test_the_mounting_of_the_camera_is_applied() -> None:
     stages, chain = simple_rooms()
     T_base_camera = np.eye(4)
     T_base_camera[2, 3] = 0.7
-    run_offline(records(2), stages, INPUTS, Timing(T_base_camera=T_base_camera))
+    run_offline(
+        records(2), stages, INPUTS, LineParams(registrar=FramesParams(T_base_camera=as_parameter(T_base_camera)))
+    )
     assert [frame.T_odom_camera[2, 3] for frame in chain.frames] == [0.7, 0.7]
 
 
 def test_gravity_comes_from_a_level_odometry_where_there_is_one() -> None:
     stages, chain = simple_rooms()
     looking_along_x = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
-    timing = Timing(level_odom=True, T_level_camera=looking_along_x @ turned_about_x(np.radians(30.0)))
+    T_level_camera = as_parameter(looking_along_x @ turned_about_x(np.radians(30.0)))
+    timing = LineParams(SegmenterNodeParams(level_odom=True, T_base_camera=T_level_camera))
     run_offline(without("/odom", 1100 * MS), stages, INPUTS, timing)
     tilted = [0, np.cos(np.radians(30)), -np.sin(np.radians(30))]
     for frame, expected in zip(chain.frames, (tilted, [0, 1, 0], tilted, tilted), strict=True):
@@ -220,7 +225,7 @@ def test_gravity_comes_from_an_imu_in_the_cameras_frame_with_how_sure_it_is() ->
 
 def test_the_mounting_of_the_imu_is_applied_and_without_one_it_tells_nothing() -> None:
     stages, chain = simple_rooms()
-    timing = Timing(T_camera_imu=turned_about_x(np.radians(-30.0)))
+    timing = LineParams(SegmenterNodeParams(T_camera_imu=as_parameter(turned_about_x(np.radians(-30.0)))))
     run_offline(felt(30.0, "imu"), stages, replace(INPUTS, imu="/imu"), timing)
     for frame in chain.frames:
         np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-4)
@@ -238,6 +243,10 @@ def test_an_imu_that_measures_nonsense_ends_nothing_and_is_counted() -> None:
     run = run_offline(said, stages, replace(INPUTS, imu="/imu"))
     assert run.frames == 4 and run.dropped == {"malformed_imu": 1}
     assert run.gravity()["imu_passed_over"] == {"no_acceleration": 1}
+
+
+def as_parameter(T: np.ndarray) -> tuple[float, ...]:
+    return (*T[:3, 3].tolist(), *quaternion_from_rotation(T[:3, :3]).tolist())
 
 
 def turned_about_x(angle: float) -> np.ndarray:
@@ -360,7 +369,7 @@ def test_what_the_wire_rounds_is_rounded() -> None:
     assert np.array_equal(again.gravity, frame.gravity) and again.gravity_confidence == frame.gravity_confidence
 
 
-def test_points_go_through_the_organiser() -> None:
+def test_points_go_through_the_organiser(monkeypatch: pytest.MonkeyPatch) -> None:
     stages, _ = simple_rooms()
     rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     rows["z"] = 2
@@ -371,7 +380,7 @@ def test_points_go_through_the_organiser() -> None:
         depth = np.ascontiguousarray(cloud.xyz[..., 2])
         return DepthImage(depth=depth, rgb=None, intrinsics=CAMERA, stamp_ns=cloud.stamp_ns)
 
-    object.__setattr__(stages, "organise", organise)
+    monkeypatch.setattr(pipeline, "organise", organise)
     clouds = [r for r in records(2) if r.topic != "/depth/image"]
     for stamp_ns in (10**9, 11 * 10**8):
         clouds.append(Record.of("/points", messages.point_cloud(rows, stamp_ns, "camera"), stamp_ns))
@@ -382,7 +391,6 @@ def test_points_go_through_the_organiser() -> None:
 @pytest.mark.parametrize(("height", "frames"), [(48, 2), (1, 0)])
 def test_a_camera_that_is_not_calibrated_stops_only_clouds_that_need_one(height: int, frames: int) -> None:
     stages, _ = simple_rooms()
-    object.__setattr__(stages, "organise", organise)
     xyz = back_project(1.5 + np.random.default_rng(1).random((48, 64)), 50.0, 50.0, 31.5, 23.5)
     rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     for axis, name in enumerate("xyz"):
@@ -393,8 +401,8 @@ def test_a_camera_that_is_not_calibrated_stops_only_clouds_that_need_one(height:
         said.append(uncalibrated(stamp_ns))
         said.append(Record.of("/points", cloud, stamp_ns))
     run = run_offline(said, stages, Inputs(image="/image", points="/points", camera_info="/camera_info"))
-    assert run.frames == frames and run.dropped == ({} if frames else {"malformed_depth": 2})
-    assert frames or "expected a calibrated K" in run.complaints["malformed_depth"]
+    assert run.frames == frames and run.dropped == ({} if frames else {"malformed_camera_info": 2})
+    assert frames or "expected a calibrated K" in run.complaints["malformed_camera_info"]
 
 
 def test_the_json_tells_of_every_frame_and_every_refusal() -> None:
@@ -435,7 +443,7 @@ def seen_of_a_lens(records: Iterator[Record], inputs: Inputs, rectified: str = "
 
     spied_segmenter = SimpleNamespace(segment=segment, choice=stages.segmenter.choice, sensor=stages.segmenter.sensor)
     spied = replace(stages, segmenter=spied_segmenter)
-    return run_offline(records, spied, inputs, Timing(rectified=rectified)), met
+    return run_offline(records, spied, inputs, LineParams(SegmenterNodeParams(rectified=rectified))), met
 
 
 def test_pictures_and_boxes_of_a_lens_reach_the_segmenter_rectified() -> None:
@@ -484,18 +492,18 @@ def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
     assert summary["depth_noise"] is None and summary["depth_lag"] is None
 
 
-def tied(place: np.ndarray, parent: str = "base", child: str = "camera") -> Timing:
+def tied(place: np.ndarray, parent: str = "base", child: str = "camera") -> LineParams:
     """One frame at a place on another, by a tree of frames."""
     tree = FrameTree()
     tree.receive(said(transform(parent, child, place)))
-    return Timing(frames=tree)
+    return LineParams(frames=tree)
 
 
 def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames_unless_it_is_told() -> None:
     place = turned_about_x(0.3)
     (stages, chain), (told_rooms, told_chain) = simple_rooms(), simple_rooms()
     run = run_offline(map(other_body, records(2)), stages, INPUTS, tied(place))
-    told = replace(tied(np.eye(4)), T_base_camera=place)
+    told = replace(tied(np.eye(4)), registrar=FramesParams(T_base_camera=as_parameter(place)))
     run_offline(map(other_body, records(2)), told_rooms, INPUTS, told)
     assert "/tf_static has the camera's 'camera' on the odometry's 'base'" in run.mount
     for frame, other in zip(chain.frames, told_chain.frames, strict=True):
@@ -507,7 +515,12 @@ def test_gravity_of_a_level_odometry_is_turned_by_the_same_place() -> None:
     place = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
 
     stages, chain = simple_rooms()
-    run_offline(map(other_body, records(2)), stages, INPUTS, replace(tied(place), level_odom=True))
+    run_offline(
+        map(other_body, records(2)),
+        stages,
+        INPUTS,
+        replace(tied(place), segmenter=SegmenterNodeParams(level_odom=True)),
+    )
     for frame in chain.frames:
         np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-6)
 
@@ -623,8 +636,8 @@ def test_a_cloud_of_a_body_is_turned_into_the_frame_of_the_picture() -> None:
     ]
     inputs = Inputs(image="/image", points="/points", odom="/odom")
     timing = tied(pose(R_body_optical.T, np.zeros(3)), "camera", "zed")
-    run = run_offline(said, replace(stages, organise=organise), inputs, timing)
+    run = run_offline(said, stages, inputs, timing)
     assert run.frames == 2 and not run.dropped
     np.testing.assert_allclose(chain.frames[0].view.xyz, xyz, atol=1e-5)
-    run = run_offline(said, replace(stages, organise=organise), inputs)
-    assert run.frames == 0 and "publish /tf_static between its frame" in run.complaints["malformed_depth"]
+    run = run_offline(said, stages, inputs)
+    assert run.frames == 0 and "publish /tf_static between its frame" in run.complaints["malformed_points"]

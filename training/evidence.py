@@ -33,7 +33,6 @@ from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN
 from objreg_ros.registration.propose.prior import Prior
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.segmenter.sensor.organise import organise
 from objreg_tools.cli.commands.simulate import camera_of, distortion_of, sensors_of
 from objreg_tools.offline.line import run_offline
 from objreg_tools.offline.stages import Stages
@@ -185,7 +184,7 @@ def gather(plan: Told) -> Rows:
             registrar = Registrar(params, method=recorder, gate=recorder.judge)
             detecting = DetectorParams(model=share.EMBEDDED, threshold=THRESHOLD)
             detector = Detector(detecting, share.model(detecting.model))
-            stages = Stages(detector, Segmenter(SegmenterParams()), registrar, organise)
+            stages = Stages(detector, Segmenter(SegmenterParams()), registrar)
             run_offline(recording.records(set(inputs.chosen().values())), stages, inputs)
             registrar.finish()
             registrar.close()

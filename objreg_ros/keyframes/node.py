@@ -59,7 +59,7 @@ class KeyframerNode(FramesNode):
             self._send, self._send, self.fail, WAITING, lambda job: job[1].nbytes
         )
         self.create_timer(LOOK_S, self._end_what_rests, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.listen_to_frames(inputs.mounting, round(inputs.odom_slop * 1e9))
+        self.listen_to_frames(inputs.mounting, inputs.odom_slop)
 
     def adopt(self) -> None:
         """Live parameters hold from the next frame on."""

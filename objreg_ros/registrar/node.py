@@ -18,6 +18,7 @@ from typing import NamedTuple
 from objreg_ros.bridge.messages.markers import MarkerScene
 from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.params import ManagedParams
+from objreg_ros.bridge.node.robots import prefixes_of
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.node.worker import Backlog, Limit
 from objreg_ros.bridge.process.intra_process import IntraProcessBus
@@ -29,7 +30,6 @@ from objreg_ros.bridge.streams.key import read_key
 from objreg_ros.bridge.streams.keyframes_in import FromRobot, KeyframesIn
 from objreg_ros.bridge.streams.params import ExchangeParams, KeyParams, PeerParams, RelocalisedParams
 from objreg_ros.bridge.streams.relocalised import Whereabouts
-from objreg_ros.bridge.streams.robots import prefixes_of
 from objreg_ros.bridge.streams.sync import Match
 from objreg_ros.data.closures import framed
 from objreg_ros.keyframes.frame_window import FrameWindow
@@ -107,7 +107,7 @@ class RegistrarNode(FramesNode):
         if self._robots:
             self._keyframes = KeyframesIn(self, self._robots, [*inputs.cameras.values()], self._take, self._key)
         else:
-            self.listen_to_frames(inputs.mounting, round(inputs.odom_slop * 1e9))
+            self.listen_to_frames(inputs.mounting, inputs.odom_slop)
 
     def _asked_to_exchange(self) -> str:
         """Our own robot's name if keyframes are exchanged; empty if not. ValueError where it has none."""

@@ -9,12 +9,11 @@ where gravity comes from it. Out: ``objects``, ``detections_3d``, ``view``, ``vi
 from __future__ import annotations
 
 import sys
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
@@ -25,9 +24,8 @@ from sensor_msgs.msg import Imu as ImuMessage
 
 from objreg_ros.bridge.camera import colour_frame, lenses, registered_depth
 from objreg_ros.bridge.camera.calibration import fitted, read_calibration
-from objreg_ros.bridge.camera.mount import Mount
 from objreg_ros.bridge.camera.transforms import receive_frames
-from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers, motion_from_msg, rvl, to_msg, vision_to_msg
+from objreg_ros.bridge.messages import from_msg, headers, motion_from_msg, rvl, to_msg, vision_to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.overridable import FIXED
 from objreg_ros.bridge.node.params import ManagedParams
@@ -35,25 +33,22 @@ from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.process.intra_process import IntraProcessBus, Surplus
 from objreg_ros.bridge.process.lifetime import await_kernels
 from objreg_ros.bridge.streams.detections_in import DetectionsIn
+from objreg_ros.bridge.streams.matching import view_streams
 from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream
 from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
 from objreg_ros.data.checked import Array
-from objreg_ros.data.frames import FeltGravity, Frame
-from objreg_ros.data.images import ColourImage, DepthImage, Detections, PointCloud
-from objreg_ros.segmenter.gravity.imu import Imu
+from objreg_ros.data.frames import Frame
+from objreg_ros.data.images import ColourImage, PointCloud
+from objreg_ros.pipeline import Host, Pipeline, Segmented
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.doubts import range_doubt, registration_doubt
-from objreg_ros.segmenter.sensor.organise import organise
 
 POINTS = {"points": PointCloud2}
 DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}
 SOURCES = {"auto": {**POINTS, **DEPTH}, "points": POINTS, "depth": DEPTH}
 COLOUR_INFO = "colour/camera_info"
 LOOK_S = 0.5  # between two looks for who keeps a camera_info
-ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames; so is an IMU's gravity
-COMPARED = 100  # the last frames over which the difference of IMU and picture is reported
-ENOUGH_COMPARED, ODD_DEG = 20, 20.0  # half of this many frames disagree by more: the IMU's mount is wrong
 IMAGES = {"image": Image, "image/compressed": CompressedImage}
 
 
@@ -70,12 +65,9 @@ class SegmenterNode(SynchronisedNode):
         await_kernels(self._warm, self.get_logger().info)
         self._camera_info: Any = read_calibration(self._inputs.camera) if self._inputs.camera else None
         self._colour_info: Any = None
-        frames = receive_frames(self)
-        self._find_pose = frames.between
-        self._imu = Imu(self._inputs.imu_mounting, self._find_pose)
-        self._mount = Mount(self._inputs.mounting, frames, self.get_logger().info)
+        self._detections = DetectionsIn(self, self._inputs.detections)
+        self._pipeline = self._made_pipeline()
         self._gravity_from: Counter[str] = Counter()  # frames by the source of their gravity
-        self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by
         self._lens = self._registered = ""  # the last messages on the lens, and on the registration of depth
         self._objects = self.offer(PointCloud2, "objects", qos.stage())
@@ -85,6 +77,17 @@ class SegmenterNode(SynchronisedNode):
         solids = vision_to_msg.Detection3DArray
         self._solids = None if solids is None else self.create_publisher(solids, "detections_3d", qos.stage())
         self._listen()
+
+    def _made_pipeline(self) -> Pipeline:
+        host = Host(
+            read=self.read,
+            timed=self.accounting.timed,
+            remind=self.throttled.remind,
+            say=self.get_logger().info,
+            detections=self._detections.read,
+            most_pixels=self.most_pixels,
+        )
+        return Pipeline(self._segmenter, self._inputs, receive_frames(self), host)
 
     def _warm(self) -> None:
         self._segmenter.warm()
@@ -101,7 +104,6 @@ class SegmenterNode(SynchronisedNode):
             self.listen(Odometry, "odom", self._on_odom, self.sensor(qos.ODOMETRY))
         else:
             self.listen(ImuMessage, "imu", self._on_imu, self.sensor(qos.ODOMETRY))
-        self._detections = DetectionsIn(self, self._inputs.detections)
 
     def _listen_for_camera(self) -> None:
         """The camera of the parameter where there is one, and no camera_info is awaited."""
@@ -158,7 +160,7 @@ class SegmenterNode(SynchronisedNode):
 
     def _on_imu(self, message: Any) -> None:
         sample = self.read_aside("imu", motion_from_msg.imu, message)
-        felt = None if sample is None else self._imu.receive(sample)
+        felt = None if sample is None else self._pipeline.imu.receive(sample)
         if felt is not None:
             self.feed("imu", felt.stamp_ns, felt)
 
@@ -185,17 +187,12 @@ class SegmenterNode(SynchronisedNode):
 
     def _choose(self, topic: str) -> None:
         """Depth has spoken, or comes by another topic now: it is known what goes with it."""
-        slop_ns = round(self._inputs.slop * 1e9)
-        streams = [Stream("depth"), Stream("detections", slop_ns=slop_ns), Stream("labels", Need.LATCHED)]
-        if self._inputs.level_odom:
-            streams.append(Stream("odom", Need.OPTIONAL, slop_ns, ODOM_DEPTH, enclosing=True))
-        else:
-            streams.append(Stream("imu", Need.OPTIONAL, slop_ns, ODOM_DEPTH, enclosing=True))
+        given = self._inputs
+        views = view_streams(given.slop, topic in POINTS, given.colour, given.level_odom)
+        streams = [*views, Stream("labels", Need.LATCHED)]
         if topic in DEPTH:
             if self._source in POINTS:
                 self._listen_for_colour()
-            streams.append(Stream("camera_info", Need.LATCHED))
-            streams.append(Stream("image", Need.OPTIONAL, slop_ns))
             if self._camera_info is None:
                 self.expect("camera_info", "camera_info")
         else:
@@ -210,68 +207,28 @@ class SegmenterNode(SynchronisedNode):
     def compute(self, stamp_ns: int, payload: Match) -> bool:
         """One depth image or cloud with its detections, by the parameters as they are now."""
         self._segmenter.params = self.settings.of(SegmenterParams)
-        raw = self._raw_pictures()
         camera_info = self.read("camera_info", fitted, self._camera_of(payload), payload["depth"])
-        seen, cloud = self._depth(payload, camera_info, raw)
-        depth = seen.depth
-        asked = self._detections.read(payload, depth, seen.camera_info, seen.raw, cloud)
-        gravity, felt = self._level_gravity(payload, depth.frame_id), self._felt_gravity(payload, depth.frame_id)
-        with self.accounting.timed("segment"):
-            prior = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
-            frame = self._segmenter.segment(asked.detections, depth, prior[0], gravity_sigma_deg=prior[1])
-        self._note_gravity()
-        self._doubt(asked.detections, depth, frame)
-        self._publish(frame, asked.names)
+        made = self._pipeline.segment(payload, self._cameras(camera_info), self._raw_pictures())
+        names = self._detections.names(payload, made.detections)
+        if made.lens:
+            self._log_lens(made.lens, made.seen.registered)
+        self._gravity_from[made.choice.source] += 1
+        self._doubt(made)
+        self._publish(made.frame, names)
         return True
-
-    def _level_gravity(self, match: Match, camera_frame: str) -> Array | None:
-        odom = match.payloads.get("odom")
-        T_body_camera = self._mount.T_body_camera(odom, camera_frame)
-        gravity = motion_from_msg.level_gravity(match.stamp_ns, odom, T_body_camera)
-        if gravity is None and self._inputs.level_odom:
-            self.throttled.remind(
-                "level_odom", "expected odometry around a frame, as level_odom is on, got none: gravity is estimated; "
-                "is odom published 8 times a second at least, stamped by the clock of the camera?"
-            )  # fmt: skip
-        return gravity
-
-    def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:
-        samples = match.payloads.get("imu")
-        if not samples:
-            return None
-        felt = self._imu.in_camera(motion_from_msg.gravity_at(match.stamp_ns, samples), camera_frame)
-        if felt is None:
-            self.throttled.remind(
-                "imu_frame", f"expected to know how the IMU is mounted, got it in {samples[0].frame_id!r} and depth in "
-                f"{camera_frame!r}: gravity is estimated; set segmenter.T_camera_imu, or publish it on /tf_static"
-            )  # fmt: skip
-        return felt
-
-    def _note_gravity(self) -> None:
-        choice = self._segmenter.choice
-        self._gravity_from[choice.source] += 1
-        if choice.disagreement_deg is None:
-            return
-        self._apart_deg.append(choice.disagreement_deg)
-        median = float(np.median(self._apart_deg))
-        if len(self._apart_deg) >= ENOUGH_COMPARED and median > ODD_DEG:
-            self.throttled.remind(
-                "imu_mounting", f"expected the gravity of the IMU and of the picture to agree, got {median:.0f} deg "
-                "between them: is segmenter.T_camera_imu right, and does its acceleration at rest point up?"
-            )  # fmt: skip
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What matching counts, frames by source of gravity, what of the IMU was not used, and how the sensor errs."""
-        apart = sorted(self._apart_deg.copy())
+        apart = sorted(self._pipeline.apart_deg.copy())
         sources = {f"gravity from {source}": count for source, count in sorted(self._gravity_from.items())}
-        passed_over = {f"imu {reason}": count for reason, count in sorted(self._imu.counts.items())}
+        passed_over = {f"imu {reason}": count for reason, count in sorted(self._pipeline.imu.counts.items())}
         middle = {"gravity of imu and picture apart p50 [deg]": f"{apart[len(apart) // 2]:.1f}"} if apart else {}
         return {**super().extra_diagnostics(), **sources, **middle, **passed_over, **self._segmenter.sensor.text()}
 
-    def _doubt(self, detections: Detections, depth: DepthImage, frame: Frame) -> None:
+    def _doubt(self, made: Segmented) -> None:
         doubts = {
-            "registration": registration_doubt(detections, depth),
-            "range": range_doubt(depth, frame.view, self._segmenter.params),
+            "registration": registration_doubt(made.detections, made.seen.depth),
+            "range": range_doubt(made.seen.depth, made.frame.view, self._segmenter.params),
         }
         for reason, text in doubts.items():
             if text is not None:
@@ -294,32 +251,14 @@ class SegmenterNode(SynchronisedNode):
         awaited = not self._inputs.camera and self._colour_info is None and self.count_publishers(COLOUR_INFO) > 0
         return colour_frame.Cameras(camera_info, self._colour_info, named, awaited)
 
-    def _log_lens(self, seen: colour_frame.SeenFrame) -> None:
+    def _log_lens(self, lens: str, registered: str) -> None:
         """Say once, and again where it changes, what is assumed of the lens and how depth is registered."""
-        lens = self.read("camera_info", lenses.describe, seen.camera_info, seen.raw)
         if lens != self._lens:
             self._lens = lens
             self.get_logger().info(f"lens: {lens}")
-        if seen.registered != self._registered:
-            self._registered = seen.registered
-            self.get_logger().info(seen.registered or "depth is registered to colour as it comes")
-
-    def _depth(
-        self, match: Match, camera_info: Any, raw: lenses.Raw
-    ) -> tuple[colour_frame.SeenFrame, PointCloud | None]:
-        """The depth image in the picture of colour, and the cloud where it comes of one."""
-        picture_frame = headers.frame_id(match["detections"])
-        if "camera_info" in match.payloads:
-            messages = match["depth"], self._cameras(camera_info), match["image"]
-            settings = self._find_pose, raw, self.most_pixels, picture_frame
-            seen = self.read("depth", colour_frame.depth_image, *messages, *settings)
-            self._log_lens(seen)
-            return seen, None
-        cloud = self.read("points", from_msg.point_cloud, match["depth"])
-        cloud = colour_frame.in_optical_frame(cloud, picture_frame, self._find_pose)
-        camera = self.read("camera_info", camera_from_msg.camera_of_cloud, camera_info, cloud, self.most_pixels)
-        with self.accounting.timed("organise"):
-            return colour_frame.SeenFrame(organise(cloud, camera), camera_info, raw), cloud
+        if registered != self._registered:
+            self._registered = registered
+            self.get_logger().info(registered or "depth is registered to colour as it comes")
 
     def _publish(self, frame: Frame, names: to_msg.Labels) -> None:
         self._objects.publish(frame, partial(to_msg.objects, frame, names))

@@ -9,14 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from objreg_ros.bridge.camera.calibration import absolute
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_tools.cli.settings import Settings, read_settings
-from objreg_tools.offline.line import Timing, run_offline
+from objreg_tools.offline.line import LineParams, run_offline
 from objreg_tools.offline.run import Run
 from objreg_tools.offline.stages import Detects, build_stages
 from objreg_tools.recording import Record, Recording, open_recording
@@ -34,6 +32,7 @@ from objreg_tools.report.run.findings import setting
 from objreg_tools.truth import Truth
 
 DRIFT, TF, NONE = "drift:", "tf", "none"
+AT_CAMERA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # T_base_camera of odometry that is of the camera itself
 BY_TRACKING = (
     "there is no odometry: the trajectory is that of the registrar's own tracking (--odometry none: no trajectory)"
 )
@@ -172,15 +171,13 @@ class Opened:
         """
         settings = self.asked.settings
         detector = settings.of("detector", DetectorParams)
-        frames = frame_tree(self.source, camera_frame(self.source, self.inputs))
-        timing = replace(self._timing(), frames=frames, max_rate=detector.max_rate)
         stages, close = build_stages(
             detector,
             settings.of("segmenter", SegmenterParams),
             registrar or settings.of("registrar", RegistrarParams),
             SeesNothing() if self.recorded else detects,
         )
-        of_run = self.inputs, timing, self.asked.max_frames, on_frame, self.recorded
+        of_run = self.inputs, self._params(), self.asked.max_frames, on_frame, self.recorded
         try:
             return run_offline(self._records(), stages, *of_run)
         finally:
@@ -202,23 +199,14 @@ class Opened:
             **run.summary(self.truth),
         }
 
-    def _timing(self) -> Timing:
-        settings = self.asked.settings
+    def _params(self) -> LineParams:
+        settings, frames = self.asked.settings, frame_tree(self.source, camera_frame(self.source, self.inputs))
         segmenter = settings.of("segmenter", SegmenterNodeParams)
         registrar = settings.of("registrar", RegistrarNodeParams)
-        timing = Timing(
-            slop_ns=round(segmenter.slop * 1e9),
-            odom_slop_ns=round(registrar.odom_slop * 1e9),
-            T_base_camera=registrar.mounting,
-            colour=segmenter.colour,
-            level_odom=segmenter.level_odom,
-            T_level_camera=segmenter.mounting,
-            rectified=segmenter.rectified,
-            T_camera_imu=segmenter.imu_mounting,
-        )
         if self.asked.drifts:
-            return replace(timing, T_base_camera=np.eye(4), level_odom=False, T_level_camera=None)
-        return timing
+            segmenter = segmenter.replaced(level_odom=False, T_base_camera=())
+            registrar = registrar.replaced(T_base_camera=AT_CAMERA)
+        return LineParams(segmenter, registrar, frames, settings.of("detector", DetectorParams).max_rate)
 
     def _records(self) -> Iterator[Record]:
         recorded = self.recorded.topics if self.recorded else {}

@@ -16,18 +16,20 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from objreg_ros import limits
 from objreg_ros.bridge.camera import colour_frame, lenses
 from objreg_ros.bridge.camera.camera_stream import CameraStream
 from objreg_ros.bridge.camera.frames import FrameTree
 from objreg_ros.bridge.camera.mount import Mount, nameless_body
 from objreg_ros.bridge.camera.pace import RateLimit
-from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers, motion_from_msg, vision_from_msg
-from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream, Synchroniser
-from objreg_ros.data.checked import Array
-from objreg_ros.data.frames import FeltGravity, Frame, ObjectCloud
-from objreg_ros.data.images import DepthImage, Detections
-from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
-from objreg_ros.segmenter.gravity.imu import Imu
+from objreg_ros.bridge.messages import from_msg, headers, motion_from_msg, vision_from_msg
+from objreg_ros.bridge.streams.matching import odometry_streams, view_streams
+from objreg_ros.bridge.streams.sync import Drop, Match, Stream, Synchroniser
+from objreg_ros.data.frames import Frame, ObjectCloud
+from objreg_ros.data.images import Detections
+from objreg_ros.params import FramesParams
+from objreg_ros.pipeline import Host, Pipeline, Segmented, Size
+from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_tools.offline.run import Run, glimpse, tracked
 from objreg_tools.offline.stages import FrameOutcome, Stages
 from objreg_tools.recording.inputs import Inputs
@@ -41,23 +43,23 @@ LEFT_OUT = f"depth_{Drop.SURPLUS.value}"
 ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames
 
 
-@dataclass(frozen=True, slots=True)
-class Timing:
-    """How the inputs are brought together, as the nodes' parameters say; ``T_base_camera`` as the registrar's.
+class _MalformedError(Exception):
+    """A message of a match breaks its contract."""
 
-    With ``level_odom`` the segmenter takes gravity from the odometry, and ``T_level_camera`` is its T_base_camera.
-    ``max_rate`` is the detector's; 0, as it is here, is every picture. ``T_camera_imu`` is the segmenter's.
-    ``frames`` is asked for each of these that is None, and takes in what /tf says during the run.
+    def __init__(self, topic: str, text: str) -> None:
+        super().__init__(text)
+        self.topic = topic
+
+
+@dataclass(frozen=True, slots=True)
+class LineParams:
+    """The parameters of the nodes that say how their inputs are brought together; ``frames`` takes in what /tf says.
+
+    ``max_rate`` is the detector's; 0, as it is here, is every picture.
     """
 
-    slop_ns: int = 20_000_000
-    odom_slop_ns: int = 20_000_000
-    T_base_camera: Array | None = None
-    colour: bool = True  # whether a depth image takes its colour from `image`
-    level_odom: bool = False
-    T_level_camera: Array | None = None
-    rectified: str = "auto"  # whether pictures come without the distortion of their lens, as the segmenter's parameter
-    T_camera_imu: Array | None = None
+    segmenter: SegmenterNodeParams = field(default_factory=SegmenterNodeParams)
+    registrar: FramesParams = field(default_factory=FramesParams)
     frames: FrameTree = field(default_factory=FrameTree)
     max_rate: float = 0.0
 
@@ -70,42 +72,39 @@ class Line:
     """
 
     def __init__(
-        self, stages: Stages, inputs: Inputs, timing: Timing, max_frames: int | None = None, recorded: bool = False
+        self, stages: Stages, inputs: Inputs, params: LineParams, max_frames: int | None = None, recorded: bool = False
     ) -> None:
         self.run = Run()
         self._recorded = recorded
         self._names: dict[int, str] = {}  # of the numbers that another detector says
-        self._stages, self._timing, self._max_frames = stages, timing, max_frames
-        self._from_points = inputs.points is not None
-        self._raw = lenses.raw_pictures(timing.rectified, inputs.depth or inputs.points, inputs.image)
-        self._camera_info: Any = None
-        self._colour_info: Any = None
-        self._has_colour_info = inputs.colour_info is not None
-        self._named = colour_frame.named_registered(inputs.depth, inputs.image)
-        self._rate_limit = RateLimit(timing.max_rate)
-        self._imu = Imu(timing.T_camera_imu, timing.frames.between)
-        self._mount = Mount(timing.T_base_camera, timing.frames, self._on_of_mount)
+        self._stages, self._inputs, self._tree, self._max_frames = stages, inputs, params.frames, max_frames
+        self._raw = lenses.raw_pictures(params.segmenter.rectified, inputs.depth or inputs.points, inputs.image)
+        self._cameras = colour_frame.Cameras(
+            depth=None,
+            named=colour_frame.named_registered(inputs.depth, inputs.image),
+            awaited=inputs.colour_info is not None,
+        )
+        self._rate_limit = RateLimit(params.max_rate)
+        self._pipeline = Pipeline(stages.segmenter, params.segmenter, params.frames, self._host())
+        self._mount = Mount(params.registrar.mounting, params.frames, self._on_of_mount)
         self._stream = CameraStream(self._mount, self._on_of_mount)
-        self._level_mount = Mount(timing.T_level_camera, timing.frames)
-        self._odom_topic = inputs.odom or ""
-        self.run.imu_passed_over = self._imu.counts
+        self.run.imu_passed_over = self._pipeline.imu.counts
         self._labels: dict[int, tuple[str, ...]] = {}  # detected in the frames that are in progress
-        self._views = Synchroniser(self._streams(), self._unmatched)
-        expected = inputs.odom is not None
-        odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH, enclosing=True, expected=expected)
-        joints = Stream("joints", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH, enclosing=True)
-        self._frames = Synchroniser([Stream("frame"), odom, joints], self._unmatched)
+        of_view, slop = params.segmenter, params.registrar.odom_slop
+        views = view_streams(of_view.slop, inputs.points is not None, of_view.colour, of_view.level_odom)
+        self._views = Synchroniser(views, self._unmatched)
+        beside = odometry_streams(slop, expected=inputs.odom is not None)
+        self._frames = Synchroniser([Stream("frame"), *beside], self._unmatched)
 
-    def _streams(self) -> list[Stream]:
-        streams = [Stream("depth"), Stream("detections", slop_ns=self._timing.slop_ns)]
-        if self._timing.level_odom:
-            streams.append(Stream("odom", Need.OPTIONAL, self._timing.slop_ns, ODOM_DEPTH, enclosing=True))
-        else:
-            streams.append(Stream("imu", Need.OPTIONAL, self._timing.slop_ns, ODOM_DEPTH, enclosing=True))
-        if self._from_points:
-            return streams
-        colour = [Stream("image", Need.OPTIONAL, self._timing.slop_ns)] if self._timing.colour else []
-        return [*streams, Stream("camera_info", Need.LATCHED), *colour]
+    def _host(self) -> Host:
+        return Host(
+            read=self._read,
+            timed=self._timed,
+            remind=self.run.complaints.setdefault,
+            say=lambda text: None,
+            detections=self._read_detections,
+            most_pixels=limits.MOST_PIXELS_OF_PICTURE,
+        )
 
     @property
     def full(self) -> bool:
@@ -114,7 +113,7 @@ class Line:
 
     def take_record(self, name: str, record: Record) -> None:
         """One recorded message of an input; one that does not decode is counted as dropped."""
-        message = self._kept("depth" if name == "points" else name, lambda: record.message)
+        message = self._kept(name, lambda: record.message)
         if message is not None:
             self.take(name, message)
 
@@ -135,29 +134,29 @@ class Line:
         elif name == "detections":
             self._take_detections(stamp_ns, message)
         elif name == "camera_info":
-            self._camera_info = message
+            self._cameras = self._cameras._replace(depth=message)
             self._feed(name, stamp_ns, message)
         elif name == "colour_info":
-            self._colour_info = message
+            self._cameras = self._cameras._replace(colour=message)
         elif name in ("depth", "points"):
             self._feed("depth", stamp_ns, message)
         elif name == "odom":
             odometry = self._kept(name, partial(motion_from_msg.odometry, message))
             if odometry is not None:
-                body = nameless_body(self._odom_topic, hasattr(message, "child_frame_id"))
-                self._mount.nameless = self._level_mount.nameless = body
+                body = nameless_body(self._inputs.odom or "", hasattr(message, "child_frame_id"))
+                self._mount.nameless = self._pipeline.mount.nameless = body
                 self._stream.take_odometry(odometry)
                 self._feed(name, stamp_ns, odometry)
                 self._track(self._frames.add(name, stamp_ns, odometry))
         elif name == "imu":
             sample = self._kept(name, partial(motion_from_msg.imu, message))
-            felt = None if sample is None else self._imu.receive(sample)
+            felt = None if sample is None else self._pipeline.imu.receive(sample)
             if felt is not None:
                 self._feed(name, stamp_ns, felt)
 
     def _take_tf(self, message: Any) -> None:
         """Take /tf in; frames wait until the joints that carry the camera are known."""
-        self._kept("tf", partial(self._timing.frames.receive_moving, message))
+        self._kept("tf", partial(self._tree.receive_moving, message))
         reached_ns = self._mount.reached_ns
         if reached_ns is not None:
             self._track(self._frames.add("joints", reached_ns, None))
@@ -202,64 +201,33 @@ class Line:
             if match.is_surplus:
                 self.run.dropped[LEFT_OUT] += 1
                 continue
-            made = self._kept("depth", partial(self._frame, match))
-            if made is not None:
-                frame, detections = made
-                self.run.detections += len(detections)
-                self.run.objects += len(frame.objects)
-                self._labels[frame.stamp_ns] = detections.label
-                self._track(self._frames.add("frame", frame.stamp_ns, frame))
+            try:
+                made = self._pipeline.segment(match, self._cameras, self._raw)
+            except _MalformedError as error:
+                self._drop(error.topic, str(error))
+            else:
+                self._pass_on(made)
 
-    def _frame(self, match: Match) -> tuple[Frame, Detections]:
-        with self._timed("decode"):
-            depth, detections = self._depth(match)
-            odom = match.payloads.get("odom")
-            T_body_camera = self._level_mount.T_body_camera(odom, depth.frame_id, match.stamp_ns)
-            gravity = motion_from_msg.level_gravity(match.stamp_ns, odom, T_body_camera)
-            felt = self._felt_gravity(match, depth.frame_id)
-        with self._timed("segment"):
-            sigma_deg = None if felt is None else felt.gravity_sigma_deg
-            gravity = gravity if felt is None else felt.gravity
-            segmenter = self._stages.segmenter
-            frame = as_sent(segmenter.segment(detections, depth, gravity, gravity_sigma_deg=sigma_deg))
-        self._note_gravity(segmenter.choice)
-        return frame, detections
+    def _pass_on(self, made: Segmented) -> None:
+        """Note what was segmented; the frame goes on, and waits for its odometry."""
+        self.run.note(made)
+        frame = as_sent(made.frame)
+        self._labels[frame.stamp_ns] = made.detections.label
+        self._track(self._frames.add("frame", frame.stamp_ns, frame))
 
-    def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:
-        samples = match.payloads.get("imu")
-        return (
-            self._imu.in_camera(motion_from_msg.gravity_at(match.stamp_ns, samples), camera_frame) if samples else None
-        )
-
-    def _note_gravity(self, choice: GravityChoice) -> None:
-        self.run.gravity_from[choice.source] += 1
-        if choice.disagreement_deg is not None:
-            self.run.gravity_apart_deg.append(choice.disagreement_deg)
-
-    def _depth(self, match: Match) -> tuple[DepthImage, Detections]:
-        """Depth and boxes of one picture without a lens."""
-        picture_frame, find_pose = _frame_of(match["detections"]), self._timing.frames.between
-        if not self._from_points:
-            cameras = colour_frame.Cameras(match["camera_info"], self._colour_info, self._named, self._has_colour_info)
-            colour = match.payloads.get("image")
-            seen = colour_frame.depth_image(
-                match["depth"], cameras, colour, find_pose, self._raw, colour_frame=picture_frame
-            )
-            self.run.lens = self.run.lens or lenses.describe(seen.camera_info, seen.raw)
-            self.run.registered = self.run.registered or seen.registered
-            found = self._found(match, seen.depth, seen.camera_info)
-            return seen.depth, lenses.detections(found, seen.camera_info, seen.raw)
-        cloud = colour_frame.in_optical_frame(from_msg.point_cloud(match["depth"]), picture_frame, find_pose)
-        depth = self._stages.organise(cloud, camera_from_msg.camera_of_cloud(self._camera_info, cloud))
-        return depth, lenses.detections(self._found(match, depth, None), self._camera_info, self._raw, cloud)
-
-    def _found(self, match: Match, depth: DepthImage, camera_info: Any) -> Detections:
+    def _read_detections(self, match: Match, size: Size, size_of_picture: Size) -> Detections:
         """The boxes or masks of a match, read now where another detector recorded them."""
         found = match["detections"]
         if isinstance(found, Detections):
             return found
-        hw = vision_from_msg.picture_hw(match.payloads.get("image"), camera_info) or depth.depth.shape
-        return vision_from_msg.detections(found, self._names, hw)
+        return self._read("detections", vision_from_msg.detections, found, self._names, size_of_picture)
+
+    def _read(self, topic: str, decode: Callable[..., Value], *messages: Any) -> Value:
+        try:
+            with self._timed("decode"):
+                return decode(*messages)
+        except ValueError as error:
+            raise _MalformedError(topic, str(error)) from error
 
     def _track(self, matches: Iterable[Match]) -> None:
         for match in matches:
@@ -293,9 +261,12 @@ class Line:
         try:
             return work()
         except ValueError as error:
-            self.run.dropped[f"malformed_{name}"] += 1
-            self.run.complaints.setdefault(f"malformed_{name}", str(error))
+            self._drop(name, str(error))
             return None
+
+    def _drop(self, name: str, why: str) -> None:
+        self.run.dropped[f"malformed_{name}"] += 1
+        self.run.complaints.setdefault(f"malformed_{name}", why)
 
     @contextmanager
     def _timed(self, stage: str) -> Iterator[None]:
@@ -308,7 +279,7 @@ def run_offline(
     records: Iterable[Record],
     stages: Stages,
     inputs: Inputs,
-    timing: Timing | None = None,
+    params: LineParams | None = None,
     max_frames: int | None = None,
     on_frame: Callable[[int], None] = lambda frames: None,
     recorded: RecordedDetections | None = None,
@@ -318,7 +289,7 @@ def run_offline(
     ``on_frame`` receives how many frames are through, those that were left out among them. ``recorded`` are detections
     that take the place of the detector's.
     """
-    line = Line(stages, inputs, timing or Timing(), max_frames, recorded is not None)
+    line = Line(stages, inputs, params or LineParams(), max_frames, recorded is not None)
     name_of = {topic: name for name, topic in inputs.chosen().items()} | (recorded.topics if recorded else {})
     for record in records:
         name = "tf" if is_moving(record.topic, record.msgtype) else name_of.get(record.topic)
@@ -328,11 +299,6 @@ def run_offline(
         if line.full:
             break
     return line.finish()
-
-
-def _frame_of(found: Any) -> str:
-    """The frame of detections, which is that of their picture, read or not."""
-    return found.frame_id if isinstance(found, Detections) else headers.frame_id(found)
 
 
 def as_sent(frame: Frame) -> Frame:

@@ -13,6 +13,7 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.closure_fields import fields_of
 from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.data.frames import Frame
+from objreg_ros.pipeline import Segmented
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.segmenter.sensor.sensor_estimate import Lag
 from objreg_tools.offline.stages import Registers
@@ -44,6 +45,16 @@ class Run:
     gravity_apart_deg: list[float] = field(default_factory=list)  # IMU and picture, in the frames that have both
     imu_passed_over: Counter[str] = field(default_factory=Counter)  # by reason
     stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+    def note(self, made: Segmented) -> None:
+        """Note a frame as the segmenter made it."""
+        self.detections += len(made.detections)
+        self.objects += len(made.frame.objects)
+        self.lens = self.lens or made.lens
+        self.registered = self.registered or made.seen.registered
+        self.gravity_from[made.choice.source] += 1
+        if made.choice.disagreement_deg is not None:
+            self.gravity_apart_deg.append(made.choice.disagreement_deg)
 
     def summary(self, truth: Truth) -> dict[str, Any]:
         """The run as JSON; the keys are stable."""

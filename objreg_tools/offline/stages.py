@@ -5,46 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.data.frames import Frame
-from objreg_ros.data.images import ColourImage, DepthImage, Detections, PointCloud
+from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.pipeline import Segments
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
 
 
 class Detects(Protocol):
     """The interface of the detector."""
 
     def detect(self, image: ColourImage) -> Detections: ...
-
-
-class Segments(Protocol):
-    """The interface of the segmenter."""
-
-    @property
-    def choice(self) -> GravityChoice:
-        """The source of gravity in the last frame."""
-        ...
-
-    @property
-    def sensor(self) -> SensorEstimate:
-        """What the frames showed of their sensor."""
-        ...
-
-    def segment(
-        self,
-        detections: Detections,
-        depth: DepthImage,
-        gravity: Array | None = None,
-        *,
-        gravity_sigma_deg: float | None = None,
-    ) -> Frame: ...
 
 
 class FrameOutcome(Protocol):
@@ -72,12 +48,11 @@ class Registers(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stages:
-    """Detector, segmenter and registrar, and how a cloud becomes a depth image."""
+    """Detector, segmenter and registrar."""
 
     detector: Detects
     segmenter: Segments
     registrar: Registers
-    organise: Callable[[PointCloud, Any], DepthImage]
 
 
 def build_stages(
@@ -92,11 +67,10 @@ def build_stages(
     from objreg_ros.registrar.registrar import Registrar
     from objreg_ros.registrar.warm import warm
     from objreg_ros.segmenter.segment import Segmenter
-    from objreg_ros.segmenter.sensor.organise import organise
 
     detects = detects or Detector.of(detector, share.model)
     segments = Segmenter(segmenter)
     segments.warm()
     warm(registrar)
     registers = Registrar(registrar)
-    return Stages(detects, segments, registers, organise), registers.close
+    return Stages(detects, segments, registers), registers.close

@@ -16,7 +16,6 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.segmenter.sensor.organise import organise
 from objreg_tools.cli.commands.simulate import camera_of, sensors_of
 from objreg_tools.offline.line import run_offline
 from objreg_tools.offline.run import Run
@@ -97,7 +96,7 @@ def run(path: Path, detector: Detects, frames: int, progress: Progress = lambda 
     try:
         with open_recording(path) as recording:
             inputs = choose_inputs(recording.topics)
-            stages = Stages(detector, Segmenter(SegmenterParams()), registrar, organise)
+            stages = Stages(detector, Segmenter(SegmenterParams()), registrar)
             records = recording.records(set(inputs.chosen().values()))
             return run_offline(records, stages, inputs, max_frames=frames, on_frame=progress)
     finally:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
+from bridge.trees import said, transform
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
@@ -130,7 +131,7 @@ def test_depth_of_another_sensor_is_brought_into_the_picture_of_colour(
     met = spied(camera, monkeypatch)
     T_colour_depth = np.eye(4)
     T_colour_depth[0, 3] = -0.12
-    camera.node._find_pose = lambda a, b: T_colour_depth if (a, b) == ("colour_eye", "depth_eye") else None
+    camera.node._pipeline.frames.receive(said(transform("colour_eye", "depth_eye", T_colour_depth)))
     of_colour = replace(CAMERA, fx=600.0, fy=600.0, cx=319.5, cy=239.5, width=640, height=480)
     info = camera.peer.create_publisher(CameraInfo, "colour/camera_info", qos.stage())
     camera.wait(lambda: info.get_subscription_count() > 0)
@@ -143,9 +144,9 @@ def test_depth_of_another_sensor_is_brought_into_the_picture_of_colour(
     assert "is registered here" in camera.node._registered
 
 
+@pytest.mark.parametrize("made", [("-p", "level_odom:=true")], indirect=True)
 def test_frames_without_a_level_odometry_that_is_asked_for_are_told(made: Callable[..., Camera]) -> None:
     camera = made()
-    camera.node._inputs = replace(camera.node._inputs, level_odom=True)
     camera.see(1.2, "eye", "eye")
     (line,) = camera.said
     assert "as level_odom is on, got none: gravity is estimated" in line

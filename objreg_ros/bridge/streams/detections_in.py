@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import String
 
-from objreg_ros.bridge.camera import lenses
 from objreg_ros.bridge.messages import from_msg, headers, to_msg, vision_from_msg
 from objreg_ros.bridge.messages.label_table import LabelTable
 from objreg_ros.bridge.messages.layout import table
@@ -20,18 +19,11 @@ from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.process.intra_process import Surplus
 from objreg_ros.bridge.streams.sync import Drop, Match
 from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
-from objreg_ros.data.images import DepthImage, Detections, PointCloud
+from objreg_ros.data.images import Detections
 
 TABLE, BOXES, MASKS = {"detections_table": PointCloud2}, {"detections_in": Detection2DArray}, {"masks": Image}
 SOURCES = {"auto": {**TABLE, **BOXES, **MASKS}, "table": TABLE, "vision_msgs": BOXES, "masks": MASKS}
 RECEIVED_S = 1.0  # most that a new name waits until every subscriber has it
-
-
-class Asked(NamedTuple):
-    """What is to be segmented, and the numbers of all names."""
-
-    detections: Detections
-    names: to_msg.Labels
 
 
 class DetectionsIn:
@@ -85,24 +77,25 @@ class DetectionsIn:
 
     # Read
 
-    def read(
-        self, match: Match, depth: DepthImage, camera_info: Any, raw: lenses.Raw, cloud: PointCloud | None
-    ) -> Asked:
-        """The boxes and masks of a match, in the picture of ``depth``; `DroppedError` for a message that has none."""
-        message, lens = match["detections"], (camera_info, raw, cloud)
-        if isinstance(message, Detections | PointCloud2):
-            names = match["labels"]
-            seen = self._node.read("detections", from_msg.detections, message, names, depth.depth.shape)
-            return Asked(self._node.read("camera_info", lenses.detections, seen, *lens), names)
-        of_picture = match.payloads.get("image"), None if cloud is not None else camera_info
-        size = vision_from_msg.picture_hw(*of_picture) or depth.depth.shape
-        seen = self._node.read("detections", self._foreign, message, size)
-        seen = self._node.read("camera_info", lenses.detections, seen, *lens)
-        self._labels.include(seen.label)
+    def read(self, match: Match, size: tuple[int, int], size_of_picture: tuple[int, int]) -> Detections:
+        """The boxes and masks of a match; `DroppedError` for a message that has none.
+
+        ``size`` (height, width) is that of the depth image, ``size_of_picture`` that of the foreign boxes' picture.
+        """
+        message = match["detections"]
+        if _is_ours(message):
+            return self._node.read("detections", from_msg.detections, message, match["labels"], size)
+        return self._node.read("detections", self._foreign, message, size_of_picture)
+
+    def names(self, match: Match, detections: Detections) -> to_msg.Labels:
+        """The numbers of all names, those of these boxes among them, which are published before they are needed."""
+        if _is_ours(match["detections"]):
+            return match["labels"]
+        self._labels.include(detections.label)
         names = self._labels.names
         if names != self._shared or self._out is None:  # the next node waits for a table, even an empty one
             self._publish(names)
-        return Asked(seen, names)
+        return names
 
     def _foreign(self, message: Any, image_hw: tuple[int, int]) -> Detections:
         return vision_from_msg.detections(message, self._names, image_hw, self._node.most_pixels)
@@ -118,3 +111,8 @@ class DetectionsIn:
 
 def _is_surplus(message: Any) -> bool:
     return isinstance(message, PointCloud2) and from_msg.is_surplus(message)
+
+
+def _is_ours(message: Any) -> bool:
+    """Whether it is of our detector, whose numbers have names in a table."""
+    return isinstance(message, Detections | PointCloud2)

@@ -21,6 +21,7 @@ from objreg_ros.bridge.camera.transforms import is_installed, receive_frames
 from objreg_ros.bridge.camera.travel import Travel
 from objreg_ros.bridge.messages import from_msg, headers, motion_from_msg
 from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.streams.matching import odometry_streams
 from objreg_ros.bridge.streams.sync import Match, Need, Stream
 from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
 from objreg_ros.data.checked import Array
@@ -45,7 +46,7 @@ class FramesNode(SynchronisedNode):
         self.odom_frame = "odom"
         self._camera: str | None = None  # the frame_id of the last frame
 
-    def listen_to_frames(self, given: Array | None, odom_slop_ns: int) -> None:
+    def listen_to_frames(self, given: Array | None, odom_slop: float) -> None:
         """Subscribe. ``given`` is the pose of the camera on the body of odometry; if None, /tf_static and /tf give it.
 
         Odometry is that of a topic, and that of /tf while no topic of it has a publisher.
@@ -64,9 +65,7 @@ class FramesNode(SynchronisedNode):
             self.listen(kind, topic, self._receive(topic), qos.stage(), watched=topic)
         self.expect("objects", "objects")
         exact = [Stream(topic) for topic in topics]
-        names = "odom", *(["joints"] if is_installed() else [])
-        beside = [Stream(name, Need.OPTIONAL, odom_slop_ns, depth=1000, enclosing=True) for name in names]
-        self.begin([*exact, Stream("labels", Need.LATCHED), *beside])
+        self.begin([*exact, Stream("labels", Need.LATCHED), *odometry_streams(odom_slop, joints=is_installed())])
 
     def _listen_to_odometry(self) -> None:
         for topic, kind in ODOMETRY.items():

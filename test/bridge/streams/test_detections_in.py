@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import Image
 
-from objreg_ros.bridge.camera import lenses
-from objreg_ros.bridge.messages import from_msg, to_msg, vision_from_msg
+from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.bridge.streams import detections_in
 from objreg_ros.bridge.streams.detections_in import DetectionsIn
 from objreg_ros.bridge.streams.sync import Drop, Match
 from objreg_ros.data.frames import UNNAMED
-from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 
 CAMERA = Intrinsics(fx=60.0, fy=60.0, cx=40.0, cy=30.0, width=80, height=60)
 DEPTH = DepthImage(depth=np.ones((60, 80), np.float32), rgb=None, intrinsics=CAMERA, stamp_ns=5)
@@ -65,8 +64,12 @@ def match(message: Any, **more: Any) -> Match:
     return Match(5, {"detections": message, "labels": {}, **more})
 
 
-def read(inputs: DetectionsIn, message: Any, **more: Any) -> detections_in.Asked:
-    return inputs.read(match(message, **more), DEPTH, None, lenses.Raw(), None)
+def read(inputs: DetectionsIn, message: Any, **more: Any) -> Detections:
+    return inputs.read(match(message, **more), (60, 80), (60, 80))
+
+
+def names(inputs: DetectionsIn, message: Any) -> to_msg.Labels:
+    return inputs.names(match(message), read(inputs, message))
 
 
 def masks() -> Image:
@@ -91,8 +94,8 @@ def test_our_table_is_read_with_the_names_that_were_told() -> None:
     message = to_msg.detections_table(boxes(2), NAMES)
     node.receive("detections_table", message)
     assert node.fed == [("labels", 0, NAMES), ("detections", 5, message)]
-    asked = read(inputs, message, labels=NAMES)
-    assert asked.detections.label == ("cup", "cup") and asked.detections.instances is None and asked.names == NAMES
+    found, matched = read(inputs, message, labels=NAMES), match(message, labels=NAMES)
+    assert found.label == ("cup", "cup") and found.instances is None and inputs.names(matched, found) == NAMES
     assert node.published == []
 
 
@@ -101,7 +104,7 @@ def test_masks_of_our_table_reach_the_segmenter_as_a_message_and_as_a_word() -> 
     instances[12:18, 11:15] = 1
     word = replace(boxes(1), instances=instances)
     for told in (word, to_msg.detections_table(word, NAMES)):
-        seen = read(DetectionsIn(NodeBase(), "table"), told, labels=NAMES).detections  # type: ignore[arg-type]
+        seen = read(DetectionsIn(NodeBase(), "table"), told, labels=NAMES)  # type: ignore[arg-type]
         np.testing.assert_array_equal(seen.instances, instances)
 
 
@@ -117,45 +120,27 @@ def test_masks_bring_a_table_of_names_that_is_everywhere_before_their_objects() 
     inputs = DetectionsIn(node, "masks")  # type: ignore[arg-type]
     node.receive("masks", masks())
     assert [name for name, *_ in node.fed] == ["labels", "detections"]
-    asked = read(inputs, masks())
-    assert asked.detections.label == (UNNAMED,) and asked.detections.instances is not None
-    assert np.bincount(asked.detections.instances.ravel())[1:].tolist() == [200]
+    found = read(inputs, masks())
+    assert found.label == (UNNAMED,) and found.instances is not None
+    assert np.bincount(found.instances.ravel())[1:].tolist() == [200]
+    assert inputs.names(match(masks()), found) == {}
     assert [from_msg.labels(message) for message in node.published] == [{}] and node.acknowledged == [1]
     inputs._names = {4: "cup"}
     for _ in range(2):
-        assert read(inputs, masks()).names == {0: "cup"}
+        assert names(inputs, masks()) == {0: "cup"}
     assert [from_msg.labels(message) for message in node.published] == [{}, {0: "cup"}] and node.acknowledged == [1, 2]
-
-
-def test_boxes_are_of_the_size_of_the_raw_picture_where_there_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    met: list[tuple[int, int]] = []
-    monkeypatch.setattr(vision_from_msg, "boxes", lambda _message, _names, image_hw: met.append(image_hw) or boxes(1))
-    inputs = DetectionsIn(NodeBase(), "auto")  # type: ignore[arg-type]
-    read(inputs, SimpleNamespace())
-    read(inputs, SimpleNamespace(), image=Image(height=120, width=160))
-    read(inputs, SimpleNamespace(), image=ColourImage(rgb=np.zeros((90, 120, 3), np.uint8), stamp_ns=5))
-    assert met == [(60, 80), (120, 160), (90, 120)]
-
-
-def test_boxes_of_a_compressed_picture_are_of_the_size_of_its_camera(monkeypatch: pytest.MonkeyPatch) -> None:
-    met: list[tuple[int, int]] = []
-    monkeypatch.setattr(vision_from_msg, "boxes", lambda _message, _names, image_hw: met.append(image_hw) or boxes(1))
-    inputs = DetectionsIn(NodeBase(), "auto")  # type: ignore[arg-type]
-    of_colour = to_msg.camera_info(replace(CAMERA, width=160, height=120), 5, "colour")
-    inputs.read(match(SimpleNamespace()), DEPTH, of_colour, lenses.Raw(), None)
-    assert met == [(120, 160)]
 
 
 def test_a_table_that_another_tells_meanwhile_is_told_again_with_the_names_that_were_met() -> None:
     node = NodeBase()
     inputs = DetectionsIn(node, "auto")  # type: ignore[arg-type]
     inputs._names = {4: "sofa"}
-    assert read(inputs, masks()).names == {0: "sofa"}
+    assert names(inputs, masks()) == {0: "sofa"}
     node.received["labels"](to_msg.labels(NAMES))  # our own detector was started beside
-    assert read(inputs, masks()).names == {**NAMES, 2: "sofa"}
+    assert names(inputs, masks()) == {**NAMES, 2: "sofa"}
     assert from_msg.labels(node.published[-1]) == {**NAMES, 2: "sofa"} and len(node.published) == 2
     node.received["labels"](node.published[-1])  # its own message
-    read(inputs, masks())
+    names(inputs, masks())
     assert len(node.published) == 2
 
 
@@ -175,6 +160,6 @@ def test_a_picture_that_is_no_mask_is_not_taken() -> None:
 def test_names_that_a_foreign_detector_takes_back_are_gone() -> None:
     inputs = DetectionsIn(NodeBase(), "auto")  # type: ignore[arg-type]
     inputs._on_names(SimpleNamespace(class_map=[SimpleNamespace(class_id=4, class_name="cup")]))
-    assert read(inputs, masks()).detections.label == ("cup",)
+    assert read(inputs, masks()).label == ("cup",)
     inputs._on_names(SimpleNamespace(class_map=[]))
-    assert read(inputs, masks()).detections.label == (UNNAMED,)
+    assert read(inputs, masks()).label == (UNNAMED,)

@@ -34,7 +34,7 @@ class Frames(FramesNode):
         self.throttled._write = self.said.append
         self.taken = list[tuple[Frame, Array | None]]()
         self.done = threading.Semaphore(0)
-        self.listen_to_frames(T_BODY_CAMERA, 20_000_000)
+        self.listen_to_frames(T_BODY_CAMERA, 0.02)
 
     def compute(self, stamp_ns: int, payload: Match) -> bool:
         try:

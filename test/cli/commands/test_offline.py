@@ -169,7 +169,7 @@ def test_the_segmenters_colour_reaches_the_run(
     seen: list = []
     monkeypatch.setattr("objreg_tools.cli.recorded.run_offline", lambda *words: seen.append(words[3]) or Run())
     offline(tum_folder(tmp_path), "--model", model, "--set", f"segmenter.colour={str(colour).lower()}")
-    assert seen[0].colour is colour
+    assert seen[0].segmenter.colour is colour
 
 
 def test_a_camera_that_is_told_takes_the_place_of_the_recordings_and_is_named_in_the_json(

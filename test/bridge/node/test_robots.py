@@ -6,7 +6,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from objreg_ros.bridge.streams.robots import prefixes_of
+from objreg_ros.bridge.node.robots import prefixes_of
 
 
 def _node(namespace: str) -> Any:
