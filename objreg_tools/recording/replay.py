@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 from collections import deque
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -84,41 +83,12 @@ def recorded_names(recording: Recording) -> dict[str, str]:
 
 def read_ahead(items: Iterable[Item], ahead: int = AHEAD) -> Iterator[Item]:
     """The same items, made in a thread of their own before they are wanted. What making them raises is raised here."""
-    ready: queue.Queue[tuple[Item | None, BaseException | None]] = queue.Queue(ahead)
-    stopped = threading.Event()
-    thread = threading.Thread(target=_read, args=(items, ready, stopped), name="read ahead", daemon=True)
-    thread.start()
+    source = iter(items)
+    reader = ThreadPoolExecutor(1, "read ahead")
     try:
-        while True:
-            item, error = ready.get()
-            if error is not None:
-                raise error
-            if item is None:
-                return
+        due = deque(reader.submit(next, source, None) for _ in range(ahead))
+        while (item := due.popleft().result()) is not None:
+            due.append(reader.submit(next, source, None))
             yield item
     finally:
-        stopped.set()
-        thread.join()
-
-
-def _read(
-    items: Iterable[Item], ready: queue.Queue[tuple[Item | None, BaseException | None]], stopped: threading.Event
-) -> None:
-    try:
-        for item in items:
-            if not _put(ready, (item, None), stopped):
-                return
-        _put(ready, (None, None), stopped)
-    except BaseException as error:
-        _put(ready, (None, error), stopped)
-
-
-def _put(ready: queue.Queue[Item], item: Item, stopped: threading.Event) -> bool:
-    """Put as soon as the queue has space; False once the reader has stopped."""
-    while not stopped.is_set():
-        try:
-            ready.put(item, timeout=0.1)
-            return True
-        except queue.Full:
-            continue
-    return False
+        reader.shutdown(cancel_futures=True)

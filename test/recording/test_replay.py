@@ -121,4 +121,4 @@ def test_a_reader_that_nobody_wants_any_more_ends() -> None:
     items = read_ahead(iter(range(10**9)), ahead=2)
     next(items)
     items.close()  # type: ignore[attr-defined]
-    assert not [thread for thread in threading.enumerate() if thread.name == "read ahead"]
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("read ahead")]
