@@ -7,6 +7,7 @@ themselves say all that is needed, so they are read, and what was done is said.
 
 from __future__ import annotations
 
+import re
 import shutil
 import sqlite3
 import tempfile
@@ -235,17 +236,9 @@ def _temporary(kept: ExitStack) -> Path:
     return Path(kept.enter_context(tempfile.TemporaryDirectory(prefix="objreg-bag-")))
 
 
-def _place(file: Path) -> list[tuple[int, int, str]]:
+def _place(file: Path) -> list[str | int]:
     """The order of names by their numbers: rec_2 before rec_10."""
-    parts, number = [], ""
-    for sign in f"{file.name}\0":
-        if sign.isdecimal() and sign.isascii():
-            number += sign
-            continue
-        parts += [(0, int(number[:18]), "")] if number else []
-        parts.append((1, 0, sign))
-        number = ""
-    return parts
+    return [int(part) if k % 2 else part for k, part in enumerate(re.split("([0-9]+)", file.name))]
 
 
 def _listed(files: Sequence[Path | str]) -> str:
