@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,6 @@ LEAST_VISIBLE = 0.6  # of a simulated object's outline
 LEAST_PIXELS = 1000
 FARTHEST = 1.75  # m, the founding method's range
 FIRST_OBJECT = 20  # labels of a cloud below it are the table; ten labels are the parts of one object
-KINDS = {("F", 4): "f4", ("F", 8): "f8", ("U", 1): "u1", ("U", 2): "u2", ("U", 4): "u4", ("I", 4): "i4"}
 
 
 @dataclass(frozen=True)
@@ -68,81 +68,30 @@ def _of_rendering(name: str, r: Rendering) -> LabelledImage:
 
 def labelled_clouds(folder: Path) -> Iterator[LabelledImage]:
     """Every PCD file of a folder with organised points and the field ``label``; the class is the name of the file."""
+    import open3d
+
     for path in sorted(folder.glob("*.pcd")):
-        fields = read_pcd(path)
-        xyz = np.stack([fields["x"], fields["y"], fields["z"]], axis=-1).astype(np.float32)
-        packed = fields["rgba"].view(np.uint32)
-        rgb = np.stack([packed >> 16, packed >> 8, packed], axis=-1).astype(np.uint8)
+        cloud = open3d.t.io.read_point_cloud(str(path)).point
+        columns = ("positions", "colors", "label")
+        xyz, rgb, label = (cloud[name].numpy().reshape(*_shape(path), -1) for name in columns)
         image = organise(PointCloud(xyz=xyz, rgb=rgb, stamp_ns=0))
-        numbers = np.where(fields["label"] >= FIRST_OBJECT, fields["label"] // 10, 0)
+        numbers = np.where(label >= FIRST_OBJECT, label // 10, 0)[..., 0]
         masks = [(numbers == n) & (image.depth > 0) for n in np.unique(numbers[numbers > 0])]
         things = [Thing(path.stem.strip("0123456789"), mask, _box(mask)) for mask in masks if mask.sum() >= 300]
         yield LabelledImage(path.stem, image, tuple(things))
 
 
+def _shape(path: Path) -> tuple[int, int]:
+    """Rows and columns of the points of a PCD file, which Open3D does not say; ValueError for what is none."""
+    sizes = dict(re.findall(rb"^(HEIGHT|WIDTH) (\d+)$", path.read_bytes(), re.MULTILINE))
+    if len(sizes) < 2:
+        raise ValueError(f"{path}: expected a PCD file, got one without height and width")
+    return int(sizes[b"HEIGHT"]), int(sizes[b"WIDTH"])
+
+
 def _box(mask: Array) -> tuple[float, float, float, float]:
     rows, cols = np.nonzero(mask)
     return float(cols.min()), float(rows.min()), float(cols.max() + 1), float(rows.max() + 1)
-
-
-def read_pcd(path: Path) -> dict[str, Array]:
-    """The fields of a PCD file as arrays (height, width); binary and binary_compressed. ValueError for other files."""
-    content = path.read_bytes()
-    head: dict[str, list[str]] = {}
-    start = 0
-    while "DATA" not in head:
-        end = content.index(b"\n", start)
-        words = content[start:end].decode("ascii", "replace").split()
-        start = end + 1
-        if words and not words[0].startswith("#"):
-            head[words[0]] = words[1:]
-    names, count = head["FIELDS"], int(head["POINTS"][0])
-    kinds = [np.dtype(KINDS[t, int(s)]) for t, s in zip(head["TYPE"], head["SIZE"], strict=True)]
-    shape = int(head["HEIGHT"][0]), int(head["WIDTH"][0])
-    if head["DATA"] == ["binary"]:
-        table = np.frombuffer(content, np.dtype(list(zip(names, kinds, strict=True))), count, start)
-        return {name: np.ascontiguousarray(table[name]).reshape(shape) for name in names}
-    if head["DATA"] != ["binary_compressed"]:
-        raise ValueError(f"{path}: expected DATA binary or binary_compressed, got {' '.join(head['DATA'])}")
-    return _compressed_fields(content[start:], names, kinds, count, shape)
-
-
-def _compressed_fields(
-    content: bytes, names: list[str], kinds: list[Any], count: int, shape: tuple[int, int]
-) -> dict[str, Array]:
-    packed, size = np.frombuffer(content, np.uint32, 2)
-    raw = _unpack(content[8 : 8 + int(packed)], int(size))
-    fields, start = {}, 0
-    for name, kind in zip(names, kinds, strict=True):
-        fields[name] = np.frombuffer(raw, kind, count, start).reshape(shape)
-        start += count * kind.itemsize
-    return fields
-
-
-def _unpack(packed: bytes, size: int) -> bytearray:
-    """LZF (Lehmann, liblzf): runs of literals, and copies of what came before."""
-    out = bytearray()
-    i = 0
-    while i < len(packed):
-        control = packed[i]
-        i += 1
-        if control < 32:
-            out += packed[i : i + control + 1]
-            i += control + 1
-            continue
-        length = control >> 5
-        if length == 7:
-            length += packed[i]
-            i += 1
-        back = ((control & 31) << 8) + packed[i] + 1
-        i += 1
-        for _ in range(length + 2) if back < length + 2 else ():
-            out.append(out[-back])
-        if back >= length + 2:
-            out += out[len(out) - back : len(out) - back + length + 2]
-    if len(out) != size:
-        raise ValueError(f"expected {size} bytes of compressed points, got {len(out)}")
-    return out
 
 
 def jittered(box: tuple[float, float, float, float], low: float, high: float, rng: Any) -> list[float]:
