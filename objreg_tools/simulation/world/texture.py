@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import colorsys
+
 import cv2
 import numpy as np
 
@@ -13,12 +15,7 @@ Colour = tuple[int, int, int]
 
 def hsv(hue: float, saturation: float, value: float) -> Colour:
     """The sRGB colour 0..255 of hue, saturation and value in 0..1; the hue wraps."""
-    sector = (hue % 1.0) * 6.0
-    chroma = value * saturation
-    second = chroma * (1 - abs(sector % 2 - 1))
-    rgb = [(chroma, second, 0), (second, chroma, 0), (0, chroma, second)]
-    rgb += [(0, second, chroma), (second, 0, chroma), (chroma, 0, second)]
-    r, g, b = (round(255 * (part + value - chroma)) for part in rgb[int(sector) % 6])
+    r, g, b = (round(255 * part) for part in colorsys.hsv_to_rgb(hue % 1.0, saturation, value))
     return r, g, b
 
 
