@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from objreg_mapper.pose_graph import PoseGraph
 from objreg_mapper.restart import Admitted, Restart
@@ -20,7 +21,7 @@ class Follower:
         self.robot, self._on_leap = robot, on_leap
         self.newest: Odometry | None = None
         self.has_news = False
-        self._count = self._passed_over_count = 0
+        self.count = self.passed_over_count = 0
         self._ended_ns = 0  # the last stamp of the run of the clock before this one
         self.forget(max_speed)
 
@@ -34,13 +35,13 @@ class Follower:
 
     def _pass_over(self, odometry: Odometry) -> None:
         """Count a pose that was wrong; one that came again or late did not leap."""
-        self._passed_over_count += 1
+        self.passed_over_count += 1
         if self.newest is not None and odometry.stamp_ns > self.newest.stamp_ns:
             self._on_leap()
 
     def follow(self, odometry: Odometry, graph: PoseGraph) -> None:
         """Take a pose that was admitted into the graph."""
-        self._count, self.newest = self._count + 1, odometry
+        self.count, self.newest = self.count + 1, odometry
         self.has_news = graph.add_odometry(odometry, self.robot) or self.has_news
 
     def jump_back(self, stamp_ns: int) -> float:
@@ -61,15 +62,6 @@ class Follower:
         """
         return self.newest is not None and self.newest.stamp_ns + JUMP_NS < stamp_ns <= self._ended_ns
 
-    def diagnostics(self, graph: PoseGraph) -> dict[str, object]:
-        """For diagnostics."""
-        return {
-            "odometry": self._count,
-            "odometry passed over": self._passed_over_count,
-            "placed in the map": graph.T_map_odom_of(self.robot) is not None,
-            "keyframes": len(graph.keyframes_of(self.robot)),
-        }
-
 
 class Followers(dict[str, Follower]):
     """Those of all robots, by name."""
@@ -83,10 +75,11 @@ class Followers(dict[str, Follower]):
         frames = [one.newest.frame_id for one in self.values() if one is not follower and one.newest is not None]
         return follower.newest is not None and follower.newest.frame_id in frames
 
-    def diagnostics(self, graph: PoseGraph) -> dict[str, object]:
-        """For diagnostics, each robot's with its name before it."""
+    def counts(self, graph: PoseGraph) -> dict[str, dict[str, Any]]:
+        """What is known of each robot, by its name: fields of `MapperDiagnostics`."""
         return {
-            f"{robot}: {key}" if robot else key: value
-            for robot, follower in self.items()
-            for key, value in follower.diagnostics(graph).items()
+            "odometry": {robot: follower.count for robot, follower in self.items()},
+            "passed_over": {robot: follower.passed_over_count for robot, follower in self.items()},
+            "placed": {robot: graph.T_map_odom_of(robot) is not None for robot in self},
+            "keyframes": {robot: len(graph.keyframes_of(robot)) for robot in self},
         }

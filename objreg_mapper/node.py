@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -15,6 +15,7 @@ from rclpy.clock import Clock, ClockType
 from std_srvs.srv import Trigger
 
 from objreg_mapper import saved
+from objreg_mapper.diagnostics import MapperDiagnostics
 from objreg_mapper.follower import Follower, Followers
 from objreg_mapper.formats.g2o import graph_text
 from objreg_mapper.map_files import graph_file, require_ours
@@ -35,6 +36,7 @@ from objreg_ros.bridge.process.intra_process import IntraProcessBus
 from objreg_ros.bridge.streams.closures_in import ClosuresIn
 from objreg_ros.bridge.streams.map_announcements import MapAnnouncements
 from objreg_ros.data.closures import LoopClosure, Moments, Robots, may_be_same
+from objreg_ros.diagnostics import Diagnostics
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.whole_file import write_whole
 
@@ -273,19 +275,21 @@ class MapperNode(NodeBase):
             )
         return False
 
-    def extra_diagnostics(self) -> Mapping[str, object]:
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """What the last solution believed, and what is known of each robot."""
-        strain = self._summary.strain
-        return self._followers.diagnostics(self._graph) | {
-            "sessions": len(self._graph.sessions),
-            "constraints kept": len(self._summary.kept),
-            "constraints pruned": len(self._summary.pruned),
-            "constraints retracted": self._withdrawn_count,
-            "constraints without odometry": len(self._waiting.closures),
-            "constraints against odometry": strain.beyond,
-            "farthest from odometry": strain.farthest,
-            "suspicious": strain.is_suspicious,
-        }
+        summary, strain = self._summary, self._summary.strain
+        own = MapperDiagnostics(
+            **self._followers.counts(self._graph),
+            sessions=len(self._graph.sessions),
+            kept=len(summary.kept),
+            pruned=len(summary.pruned),
+            retracted=self._withdrawn_count,
+            without_odometry=len(self._waiting.closures),
+            against_odometry=strain.beyond,
+            farthest=strain.farthest,
+            suspicious=strain.is_suspicious,
+        )
+        return (*super().own_diagnostics(), own)
 
     def found(self) -> Sequence[Finding]:
         """Whether closures bend the map farther than odometry lets expect."""

@@ -33,7 +33,8 @@ FREE_BRIDGE = (
     *("bridge.camera.lenses", "bridge.camera.mount", "bridge.camera.pace", "bridge.camera.registered_depth"),
     *("bridge.camera.travel", "bridge.streams.clock_monitor", "bridge.streams.sync", "bridge.streams.matching"),
 )
-CORE = ("limits", "sensor", "whole_file", "terminal", "extra", "data", "lens", "geometry", "params", "share")
+FOR_ALL = ("limits", "sensor", "whole_file", "terminal", "share", "extra", "diagnostics")
+CORE = (*FOR_ALL, "data", "lens", "geometry", "params")
 DRIVERS = tuple(f"objreg_tools.{name}" for name in ("offline", "rehearsal", "truth", "workers", "report"))
 
 
@@ -97,7 +98,7 @@ def step(module: str) -> int:
 
 def allowed(importer: str, imported: str) -> bool:
     """The table of the import law."""
-    if imported in ("limits", "sensor", "whole_file", "terminal", "share", "extra") and importer not in ("", *CORE):
+    if imported in FOR_ALL and importer not in ("", *CORE):
         return True
     if below(importer, "objreg_tools"):
         return allowed_in_tools(importer, imported)
@@ -178,7 +179,8 @@ def allowed_in_ros(importer: str, imported: str) -> bool:
 
 
 def may_use_ros(module: str) -> bool:
-    is_pure = module in (*FREE_BRIDGE, "objreg_mapper.adapters.params", "objreg_mapper.adapters.rtabmap_nodes")
+    of_adapters = (f"objreg_mapper.adapters.{name}" for name in ("diagnostics", "params", "rtabmap_nodes"))
+    is_pure = module in (*FREE_BRIDGE, *of_adapters, "bridge.node.accounting", "bridge.node.common")
     speaks_ros = below(module, "objreg_tools.cli", "objreg_mapper.adapters", "bridge") and not is_pure
     return module.endswith(".node") or speaks_ros
 

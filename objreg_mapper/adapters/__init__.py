@@ -3,5 +3,6 @@
 
 `rtabmap`, `lio_sam`, `hydra` and `g2o` are one node each. `adapter` is what they share: closures come in once each and
 wait for their consumer. `body` says where the camera sits, `odometry_in` follows odometry, `rtabmap_nodes` knows the
-keyframes of RTAB-Map, `params` has the parameters. What fills their messages is in `objreg_mapper/formats/`.
+keyframes of RTAB-Map, `params` has the parameters, `diagnostics` what they report. What fills their messages is in
+`objreg_mapper/formats/`.
 """

@@ -4,18 +4,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 
+from objreg_mapper.adapters.diagnostics import AdapterDiagnostics
 from objreg_mapper.adapters.params import AdapterParams
 from objreg_ros.bridge.messages import closures_msg, from_msg, headers
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.data.closures import LoopClosure, Moments
+from objreg_ros.diagnostics import Diagnostics
 from objreg_ros.params import Params
 
 LOOK_S = 0.1  # between two looks at what waits
@@ -166,9 +167,10 @@ class Adapter(NodeBase):
         self.waiting.pop(key, None)
         self.forget(key)
 
-    def extra_diagnostics(self) -> Mapping[str, object]:
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """What came more than once, and what was withdrawn."""
-        return {"repeated": self._again, "retracted": self._retracted, "retracted too late": self._retracted_late}
+        own = AdapterDiagnostics(repeated=self._again, retracted=self._retracted, retracted_late=self._retracted_late)
+        return (*super().own_diagnostics(), own)
 
 
 def seconds() -> float:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from std_srvs.srv import Trigger
 
 from objreg_mapper.adapters.adapter import Adapter
 from objreg_mapper.adapters.body import Body
+from objreg_mapper.adapters.diagnostics import G2oDiagnostics
 from objreg_mapper.adapters.odometry_in import OdometryIn
 from objreg_mapper.adapters.params import BodyParams, ToG2oParams
 from objreg_mapper.formats.g2o import graph_text
@@ -25,6 +25,7 @@ from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.data.closures import LoopClosure, Moments
 from objreg_ros.data.frames import Odometry
+from objreg_ros.diagnostics import Diagnostics
 from objreg_ros.whole_file import write_whole
 
 
@@ -125,10 +126,11 @@ class ToG2o(Adapter):
             response.success, response.message = True, str(path)
         return response
 
-    def extra_diagnostics(self) -> Mapping[str, object]:
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """And what the file has."""
-        counts = {"vertices": len(self._graph.keyframes), "constraints in the file": len(self._graph.closure_ties)}
-        return {**super().extra_diagnostics(), **counts}
+        graph = self._graph
+        own = G2oDiagnostics(vertices=len(graph.keyframes), constraints=len(graph.closure_ties))
+        return (*super().own_diagnostics(), own)
 
     def close(self) -> None:
         """Write what is new, then end."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import sys
 from collections import Counter
-from collections.abc import Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -18,6 +17,7 @@ from rclpy.task import Future
 
 from objreg_mapper.adapters.adapter import Adapter, require, seconds
 from objreg_mapper.adapters.body import Body
+from objreg_mapper.adapters.diagnostics import RtabmapDiagnostics
 from objreg_mapper.adapters.odometry_in import OdometryIn
 from objreg_mapper.adapters.params import BodyParams, ToRtabmapParams
 from objreg_mapper.adapters.rtabmap_nodes import RtabmapNodes
@@ -29,6 +29,7 @@ from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.data.closures import LoopClosure, Moments
 from objreg_ros.data.frames import Odometry
+from objreg_ros.diagnostics import Diagnostics
 
 try:
     from rtabmap_msgs.msg import MapData
@@ -198,10 +199,11 @@ class ToRtabmap(Adapter):
         self._since.pop(key, None)
         self._attempts.pop(key, None)
 
-    def extra_diagnostics(self) -> Mapping[str, object]:
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """And what is known of RTAB-Map."""
-        known = {"nodes of rtabmap": len(self._nodes), "other databases": self._databases}
-        return {**super().extra_diagnostics(), **known, "add_link": self._add.service_is_ready()}
+        answers = self._add.service_is_ready()
+        own = RtabmapDiagnostics(nodes=len(self._nodes), databases=self._databases, answers=answers)
+        return (*super().own_diagnostics(), own)
 
 
 def main() -> int:

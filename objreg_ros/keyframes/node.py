@@ -8,7 +8,6 @@ import sys
 import threading
 import time
 import uuid
-from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import CompressedImage
@@ -24,6 +23,8 @@ from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import read_key
 from objreg_ros.bridge.streams.params import KeyParams
 from objreg_ros.bridge.streams.sync import Match
+from objreg_ros.diagnostics import Diagnostics
+from objreg_ros.keyframes.diagnostics import KeyframerDiagnostics
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import SILENCE_S, Keyframer
@@ -101,11 +102,14 @@ class KeyframerNode(FramesNode):
             self._sent, self._sent_bytes = self._sent + 1, self._sent_bytes + len(packed)
         return True
 
-    def extra_diagnostics(self) -> dict[str, Any]:
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """How many keyframes were sent, and how large they are."""
-        mean = {"kilobytes a keyframe": round(1e-3 * self._sent_bytes / self._sent, 1)} if self._sent else {}
-        lost = {"frames without odometry": self.without_odometry}
-        return {**super().extra_diagnostics(), "keyframes sent": self._sent, **mean, **lost}
+        own = KeyframerDiagnostics(
+            sent=self._sent,
+            mean_kilobytes=1e-3 * self._sent_bytes / self._sent if self._sent else None,
+            without_odometry=self.without_odometry,
+        )
+        return (*super().own_diagnostics(), own)
 
     def shut(self) -> None:
         """Send what is left, unless a signal has ended ROS before, and end both workers."""

@@ -10,10 +10,9 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from objreg_ros.bridge.messages.markers import MarkerScene
 from objreg_ros.bridge.node.node_base import DroppedError
@@ -32,7 +31,9 @@ from objreg_ros.bridge.streams.params import ExchangeParams, KeyParams, PeerPara
 from objreg_ros.bridge.streams.relocalised import Whereabouts
 from objreg_ros.bridge.streams.sync import Match
 from objreg_ros.data.closures import framed
+from objreg_ros.diagnostics import Diagnostics
 from objreg_ros.keyframes.frame_window import FrameWindow
+from objreg_ros.registrar.diagnostics import RegistrarDiagnostics
 from objreg_ros.registrar.exchange import Exchange
 from objreg_ros.registrar.origins import arrival_of
 from objreg_ros.registrar.outcome import Outcome
@@ -87,7 +88,7 @@ class RegistrarNode(FramesNode):
         self._unsearched, self._scene = 0, MarkerScene()
         self._may_reset = self.settings.of(PeerParams).allow_remote_reset
         self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
-        self._counts = dict(self._registrar.counts())
+        self._counts = dict[str, Any](self._registrar.counts())
         self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
         self._robot = self._asked_to_exchange()
         limit, nice = self._limit(), self._niceness()
@@ -219,14 +220,19 @@ class RegistrarNode(FramesNode):
                 "recognised any more",
             )
 
-    def extra_diagnostics(self) -> Mapping[str, object]:
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """What is stored and what waits, and what was announced of closures."""
-        stored = {f"stored {what}": count for what, count in self._counts.items() if what != "forgotten"}
-        counts = {"stored unsearched": self._unsearched, "forgotten keyframes": self._counts["forgotten"]}
-        counts |= {"waiting keyframes": len(self.searcher), "waiting poses": self._registrar.waiting}
-        counts["frames without odometry"] = self.without_odometry
-        robots = self._keyframes.diagnostics() if self._robots else self._others.diagnostics() if self._robot else {}
-        return {**super().extra_diagnostics(), **stored, **counts, **robots, **self._announcements.diagnostics()}
+        own = RegistrarDiagnostics(
+            **self._counts,
+            unsearched=self._unsearched,
+            waiting_keyframes=len(self.searcher),
+            waiting_poses=self._registrar.waiting,
+            without_odometry=self.without_odometry,
+            robots=self._keyframes.counts if self._robots else {},
+            exchange=self._exchange.counters if self._robot else {},
+            **self._announcements.counts(),
+        )
+        return (*super().own_diagnostics(), own)
 
     # Services
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -39,7 +38,9 @@ from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import Frame
 from objreg_ros.data.images import ColourImage, PointCloud
+from objreg_ros.diagnostics import Diagnostics
 from objreg_ros.pipeline import Host, Pipeline, Segmented
+from objreg_ros.segmenter.diagnostics import SegmenterDiagnostics
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.doubts import range_doubt, registration_doubt
@@ -217,13 +218,19 @@ class SegmenterNode(SynchronisedNode):
         self._publish(made.frame, names)
         return True
 
-    def extra_diagnostics(self) -> Mapping[str, object]:
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """What matching counts, frames by source of gravity, what of the IMU was not used, and how the sensor errs."""
-        apart = sorted(self._pipeline.apart_deg.copy())
-        sources = {f"gravity from {source}": count for source, count in sorted(self._gravity_from.items())}
-        passed_over = {f"imu {reason}": count for reason, count in sorted(self._pipeline.imu.counts.items())}
-        middle = {"gravity of imu and picture apart p50 [deg]": f"{apart[len(apart) // 2]:.1f}"} if apart else {}
-        return {**super().extra_diagnostics(), **sources, **middle, **passed_over, **self._segmenter.sensor.text()}
+        apart, sensor = sorted(self._pipeline.apart_deg.copy()), self._segmenter.sensor
+        lag = sensor.lag
+        own = SegmenterDiagnostics(
+            gravity_from=self._gravity_from,
+            median_apart_deg=apart[len(apart) // 2] if apart else None,
+            imu=self._pipeline.imu.counts,
+            noise=sensor.noise,
+            turned=sensor.depth_to_colour.text() or None,
+            lag=None if lag is None else lag.text(),
+        )
+        return (*super().own_diagnostics(), own)
 
     def _doubt(self, made: Segmented) -> None:
         doubts = {

@@ -32,9 +32,9 @@ def test_poses_come_into_the_graph_as_those_of_the_robot() -> None:
     assert [session.robot for session in graph.sessions] == ["a", "b"]
     assert one.has_news and one.newest is not None and one.newest.stamp_ns == WALK[19].stamp_ns
     keyframes = len(graph.sessions[0].keyframes)
-    known = {"odometry": 20, "odometry passed over": 0, "placed in the map": True, "keyframes": keyframes}
-    assert one.diagnostics(graph) == known and keyframes > 5
-    assert other.diagnostics(graph)["placed in the map"] is False
+    counts = Followers(a=one, b=other).counts(graph)
+    assert counts["odometry"] == {"a": 20, "b": 20} and counts["passed_over"] == {"a": 0, "b": 0}
+    assert counts["placed"] == {"a": True, "b": False} and counts["keyframes"]["a"] == keyframes > 5
 
 
 def test_a_pose_that_leaps_is_told_and_one_that_comes_late_is_counted() -> None:
@@ -43,7 +43,7 @@ def test_a_pose_that_leaps_is_told_and_one_that_comes_late_is_counted() -> None:
     away = replace(WALK[20], T_odom_body=pose(np.eye(3), np.array([30.0, 0.0, 0.0])))
     for word in (away, WALK[21], WALK[15]):
         follower.admit(word)
-    assert leaps == ["a"] and follower.diagnostics(PoseGraph())["odometry passed over"] == 2
+    assert leaps == ["a"] and follower.passed_over_count == 2
 
 
 def test_after_time_jumped_back_what_was_found_before_is_of_the_old_run() -> None:
@@ -72,4 +72,3 @@ def test_frames_of_one_name_are_shared() -> None:
     followers = Followers({robot: followed(graph, robot, frame_id=frame) for robot, frame in frames.items()})
     assert [followers.share_frame(one) for one in followers.values()] == [True, True, False]
     assert [len(followers.meant(robot)) for robot in ("a", "", "x")] == [1, 3, 3]
-    assert followers.diagnostics(graph)["b: odometry"] == 20

@@ -28,6 +28,7 @@ from objreg_ros.bridge.messages import headers, motion_from_msg, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.log import ThrottledLog
 from objreg_ros.data.closures import LoopClosure
+from objreg_ros.diagnostics import by_key
 from objreg_ros.geometry import pose, rotation_from_vector
 
 from .bent import SECOND, bent, closure, odometry, square
@@ -36,6 +37,11 @@ TRUE = square(laps=2)
 BENT = bent(TRUE)
 HALF = len(TRUE) // 2
 ROUND_TRIP = [closure(TRUE, k, k + HALF) for k in range(3, HALF, 20)]
+
+
+def reported(node: MapperNode) -> dict[str, Any]:
+    """What the mapper reports of itself, by key."""
+    return by_key(*node.own_diagnostics())
 
 
 class Outside:
@@ -70,7 +76,7 @@ class Outside:
         """Odometry in the camera's stead: one message at a time, so that none is lost on the way."""
         for count, word in enumerate(odometry(poses), start=1):
             self.odom.publish(to_msg.odometry(word))
-            self.wait(lambda count=count: self.node.extra_diagnostics()["odometry"] >= count)
+            self.wait(lambda count=count: reported(self.node)["odometry"] >= count)
 
     def send(self, closures: list[LoopClosure]) -> None:
         for word in closures:
@@ -101,7 +107,7 @@ def test_the_path_ends_where_the_walk_began_once_constraints_are_in(outside: Out
     outside.send(ROUND_TRIP[:1])  # before its odometry: it waits
     outside.drive(BENT)
     outside.send(ROUND_TRIP[1:])
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(lambda: reported(outside.node)["constraints kept"] == len(ROUND_TRIP))
     outside.wait(outside.settled)
     outside.wait(lambda: np.linalg.norm(end_of(outside.paths[-1])[:3, 3]) < 0.3 * np.linalg.norm(BENT[-1][:3, 3]))
     assert outside.paths[-1].header.frame_id == "map"
@@ -110,14 +116,14 @@ def test_the_path_ends_where_the_walk_began_once_constraints_are_in(outside: Out
 
 def test_the_path_grows_with_every_keyframe_before_any_constraint(outside: Outside) -> None:
     outside.drive(BENT[:40])
-    keyframes = outside.node.extra_diagnostics()["keyframes"]
+    keyframes = reported(outside.node)["keyframes"]
     outside.wait(lambda: outside.paths and len(outside.paths[-1].poses) == keyframes > 3)
 
 
 def test_the_correction_carries_odom_to_map(outside: Outside) -> None:
     outside.drive(BENT)
     outside.send(ROUND_TRIP)
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(lambda: reported(outside.node)["constraints kept"] == len(ROUND_TRIP))
 
     def end() -> np.ndarray:
         return motion_from_msg.odometry(outside.corrections[-1]).T_odom_body @ BENT[-1]
@@ -130,8 +136,8 @@ def test_a_wrong_constraint_is_pruned_and_told(outside: Outside) -> None:
     off = pose(rotation_from_vector(np.array([0.0, 0.0, 1.2])), np.array([0.8, 0.6, 0.0]))
     outside.drive(BENT)
     outside.send([*ROUND_TRIP, closure(TRUE, 10, 90, off)])
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints pruned"] == 1)
-    assert outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP)
+    outside.wait(lambda: reported(outside.node)["constraints pruned"] == 1)
+    assert reported(outside.node)["constraints kept"] == len(ROUND_TRIP)
 
 
 def test_a_live_parameter_holds_from_the_next_solution_on(outside: Outside) -> None:
@@ -139,10 +145,10 @@ def test_a_live_parameter_holds_from_the_next_solution_on(outside: Outside) -> N
     outside.node.set_parameters([Parameter("max_residual", value=1e6)])
     outside.drive(BENT)
     outside.send([*ROUND_TRIP, closure(TRUE, 10, 90, off)])
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP) + 1)
+    outside.wait(lambda: reported(outside.node)["constraints kept"] == len(ROUND_TRIP) + 1)
     outside.node.set_parameters([Parameter("max_residual", value=5.0)])
     outside.send([closure(TRUE, 11, 11 + HALF)])
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints pruned"] == 1)
+    outside.wait(lambda: reported(outside.node)["constraints pruned"] == 1)
 
 
 def test_what_cannot_be_used_is_dropped_by_reason(outside: Outside) -> None:
@@ -164,13 +170,13 @@ def test_odometry_that_begins_anew_elsewhere_is_on_the_map_once_constraints_tie_
     away = pose(np.eye(3), np.array([3.0, 0.0, 0.0]))
     for count, word in enumerate(walk[HALF:], start=HALF - 1):  # the first two of them are held back
         outside.odom.publish(to_msg.odometry(replace(word, T_odom_body=away @ word.T_odom_body)))
-        outside.wait(lambda count=count: outside.node.extra_diagnostics()["odometry"] >= min(count, HALF))
-    outside.wait(lambda: outside.node.extra_diagnostics()["odometry"] == len(walk))
-    told = outside.node.extra_diagnostics()
+        outside.wait(lambda count=count: reported(outside.node)["odometry"] >= min(count, HALF))
+    outside.wait(lambda: reported(outside.node)["odometry"] == len(walk))
+    told = reported(outside.node)
     assert (told["sessions"], told["placed in the map"]) == (2, False)
     assert headers.stamp_ns(outside.corrections[-1]) < walk[HALF].stamp_ns  # where it is now nobody knows
     outside.send(ROUND_TRIP)
-    outside.wait(lambda: outside.node.extra_diagnostics()["placed in the map"] and outside.settled())
+    outside.wait(lambda: reported(outside.node)["placed in the map"] and outside.settled())
     outside.wait(
         lambda: outside.paths and outside.paths[-1].poses and np.linalg.norm(end_of(outside.paths[-1])[:3, 3]) < 0.5
     )
@@ -184,7 +190,7 @@ def test_two_publishers_of_odometry_do_not_fill_the_log(outside: Outside, monkey
     away = pose(np.eye(3), np.array([3.0, 0.0, 0.0]))
     for word in odometry([away @ T if k % 2 else T for k, T in enumerate(BENT[:20])]):
         outside.node._on_odometry(to_msg.odometry(word))
-    assert outside.node.extra_diagnostics()["odometry"] == 10
+    assert reported(outside.node)["odometry"] == 10
     assert len(said) == 1 and "more than one publisher" in said[0]
 
 
@@ -192,7 +198,7 @@ def test_a_constraint_within_a_gap_of_the_odometry_is_dropped(outside: Outside) 
     outside.drive(BENT[:20])
     for word in odometry(BENT)[60:62]:
         outside.odom.publish(to_msg.odometry(word))
-    outside.wait(lambda: outside.node.extra_diagnostics()["odometry"] == 22)
+    outside.wait(lambda: reported(outside.node)["odometry"] == 22)
     outside.send([closure(TRUE, 5, 40)])
     outside.wait(lambda: outside.node.accounting.balance().dropped == {"odometry_gap": 1})
 
@@ -200,14 +206,14 @@ def test_a_constraint_within_a_gap_of_the_odometry_is_dropped(outside: Outside) 
 def test_a_constraint_from_the_very_first_moment_waits_for_the_second(outside: Outside) -> None:
     outside.drive(BENT[:5])
     outside.send([closure(TRUE, 0, 90)])
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints without odometry"] == 1)
+    outside.wait(lambda: reported(outside.node)["constraints without odometry"] == 1)
     assert not outside.node.accounting.balance().dropped
 
 
 def test_what_was_solved_when_a_reset_came_is_of_no_map(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:
     outside.drive(BENT)
     outside.send(ROUND_TRIP)
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(lambda: reported(outside.node)["constraints kept"] == len(ROUND_TRIP))
     outside.wait(outside.settled)
     node, solve = outside.node, Problem.solve
 
@@ -217,15 +223,15 @@ def test_what_was_solved_when_a_reset_came_is_of_no_map(outside: Outside, monkey
 
     monkeypatch.setattr(Problem, "solve", reset_meanwhile)
     node.compute(0, None)
-    assert (node.extra_diagnostics()["keyframes"], node.extra_diagnostics()["constraints kept"]) == (0, 0)
+    assert (reported(node)["keyframes"], reported(node)["constraints kept"]) == (0, 0)
 
 
 def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
     outside.drive(BENT[:40])
-    keyframes = outside.node.extra_diagnostics()["keyframes"]
+    keyframes = reported(outside.node)["keyframes"]
     for again in odometry(BENT)[:3]:
         outside.odom.publish(to_msg.odometry(again))
-    outside.wait(lambda: outside.node.extra_diagnostics()["keyframes"] == 1)
+    outside.wait(lambda: reported(outside.node)["keyframes"] == 1)
     assert keyframes > 3
 
 
@@ -236,29 +242,29 @@ def test_a_jump_back_in_time_is_another_session_where_closures_name_them(outside
     node._learn(replace(closure(TRUE, 5, 30), from_session=1, to_session=1))
     for again in walk[:30]:
         outside.odom.publish(to_msg.odometry(again))
-    outside.wait(lambda: node.extra_diagnostics()["odometry"] == 70)
-    assert (node.extra_diagnostics()["sessions"], node.extra_diagnostics()["placed in the map"]) == (2, False)
+    outside.wait(lambda: reported(node)["odometry"] == 70)
+    assert (reported(node)["sessions"], reported(node)["placed in the map"]) == (2, False)
     for k in (3, 15):
         node._take(replace(closure(TRUE, k + 5, k), from_session=1, to_session=2))
-    outside.wait(lambda: node.extra_diagnostics()["placed in the map"])
-    assert node.extra_diagnostics()["constraints kept"] == 2
+    outside.wait(lambda: reported(node)["placed in the map"])
+    assert reported(node)["constraints kept"] == 2
 
 
 def test_odometry_that_comes_late_is_passed_over_and_counted_and_leaves_the_map(outside: Outside) -> None:
     node = outside.node
     outside.drive(BENT)
     outside.send(ROUND_TRIP)
-    outside.wait(lambda: node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
-    keyframes, correction = node.extra_diagnostics()["keyframes"], node._graph.T_map_odom
+    outside.wait(lambda: reported(node)["constraints kept"] == len(ROUND_TRIP))
+    keyframes, correction = reported(node)["keyframes"], node._graph.T_map_odom
     for steps_back in (2, 10):  # 0.1 s and 0.9 s before the last
         outside.odom.publish(to_msg.odometry(odometry(BENT)[-steps_back]))
-    outside.wait(lambda: node.extra_diagnostics()["odometry passed over"] == 2)
-    assert (node.extra_diagnostics()["keyframes"], node.extra_diagnostics()["odometry"]) == (keyframes, len(BENT))
+    outside.wait(lambda: reported(node)["odometry passed over"] == 2)
+    assert (reported(node)["keyframes"], reported(node)["odometry"]) == (keyframes, len(BENT))
     np.testing.assert_array_equal(node._graph.T_map_odom, correction)
     for steps_back in (45, 44, 43):  # seconds: the clock was set back, as the next two follow
-        assert node.extra_diagnostics()["keyframes"] == keyframes
+        assert reported(node)["keyframes"] == keyframes
         outside.odom.publish(to_msg.odometry(odometry(BENT)[-steps_back]))
-    outside.wait(lambda: node.extra_diagnostics()["keyframes"] == 1)
+    outside.wait(lambda: reported(node)["keyframes"] == 1)
 
 
 def test_one_odometry_with_a_wrong_stamp_leaves_the_map(outside: Outside) -> None:
@@ -267,21 +273,21 @@ def test_one_odometry_with_a_wrong_stamp_leaves_the_map(outside: Outside) -> Non
     for stamp_ns in (0, odometry(BENT)[60].stamp_ns + 3600 * 10**9):
         outside.odom.publish(to_msg.odometry(replace(odometry(BENT)[60], stamp_ns=stamp_ns)))
         outside.odom.publish(to_msg.odometry(odometry(BENT)[60 if stamp_ns == 0 else 61]))
-    outside.wait(lambda: node.extra_diagnostics()["odometry"] == 62)
-    assert node.extra_diagnostics()["odometry passed over"] == 2 and node.extra_diagnostics()["keyframes"] > 1
+    outside.wait(lambda: reported(node)["odometry"] == 62)
+    assert reported(node)["odometry passed over"] == 2 and reported(node)["keyframes"] > 1
 
 
 def test_one_pose_that_leaps_and_two_stale_ones_leave_the_map(outside: Outside) -> None:
     node, walk = outside.node, odometry(BENT)
     outside.drive(BENT[:60])
-    keyframes = node.extra_diagnostics()["keyframes"]
+    keyframes = reported(node)["keyframes"]
     away = pose(np.eye(3), np.array([30.0, 0.0, 0.0]))
     outlier = replace(walk[60], T_odom_body=away @ walk[60].T_odom_body)
     for word in (outlier, walk[61], walk[5], walk[6], walk[62]):
         outside.odom.publish(to_msg.odometry(word))
-    outside.wait(lambda: node.extra_diagnostics()["odometry"] == 62)
-    assert node.extra_diagnostics()["odometry passed over"] == 3
-    assert node.extra_diagnostics()["keyframes"] >= keyframes and node._graph.keyframes.stamps_ns[0] == 0
+    outside.wait(lambda: reported(node)["odometry"] == 62)
+    assert reported(node)["odometry passed over"] == 3
+    assert reported(node)["keyframes"] >= keyframes and node._graph.keyframes.stamps_ns[0] == 0
 
 
 def test_a_constraint_that_no_body_can_have_gone_is_dropped_as_implausible(outside: Outside) -> None:
@@ -289,7 +295,7 @@ def test_a_constraint_that_no_body_can_have_gone_is_dropped_as_implausible(outsi
     far = [closure(TRUE, k, 90, pose(np.eye(3), np.array([x, 0.0, 0.0]))) for k, x in ((10, 50.0), (11, 1e9))]
     outside.send([*ROUND_TRIP, *far])
     outside.wait(lambda: outside.node.accounting.balance().dropped == {"implausible": 2} and outside.settled())
-    assert outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP)
+    assert reported(outside.node)["constraints kept"] == len(ROUND_TRIP)
 
 
 def test_a_constraint_that_makes_solutions_fail_is_pruned_and_the_map_goes_on(
@@ -305,33 +311,33 @@ def test_a_constraint_that_makes_solutions_fail_is_pruned_and_the_map_goes_on(
     monkeypatch.setattr(Solver, "_close", fail)
     outside.drive(BENT)
     outside.send([ROUND_TRIP[0], poison, *ROUND_TRIP[1:]])
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints pruned"] == 1 and outside.settled())
+    outside.wait(lambda: reported(outside.node)["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(lambda: reported(outside.node)["constraints pruned"] == 1 and outside.settled())
 
 
 def test_constraints_that_wait_do_not_outlive_a_jump_back_in_time_or_a_reset(outside: Outside) -> None:
     node, ahead = outside.node, [closure(TRUE, 10, 90), closure(TRUE, 12, 92)]
     outside.drive(BENT[:40])
     outside.send(ahead[:1])
-    outside.wait(lambda: node.extra_diagnostics()["constraints without odometry"] == 1)
+    outside.wait(lambda: reported(node)["constraints without odometry"] == 1)
     for again in odometry(BENT)[:3]:
         outside.odom.publish(to_msg.odometry(again))
     outside.wait(lambda: node.accounting.balance().dropped == {"time_jump": 1})
     outside.send(ahead[1:])
-    outside.wait(lambda: node.extra_diagnostics()["constraints without odometry"] == 1)
+    outside.wait(lambda: reported(node)["constraints without odometry"] == 1)
     assert node._reset(None, Trigger.Response()).success
     assert node.accounting.balance().dropped == {"time_jump": 1, "reset": 1}
-    assert outside.settled() and node.extra_diagnostics()["constraints without odometry"] == 0
+    assert outside.settled() and reported(node)["constraints without odometry"] == 0
 
 
 def test_a_constraint_that_was_found_before_time_jumped_back_is_not_tied_after_it(outside: Outside) -> None:
     outside.drive(BENT[:60])
     for again in odometry(BENT)[:3]:
         outside.odom.publish(to_msg.odometry(again))
-    outside.wait(lambda: outside.node.extra_diagnostics()["keyframes"] == 1)
+    outside.wait(lambda: reported(outside.node)["keyframes"] == 1)
     outside.send([closure(TRUE, 5, 58), closure(TRUE, 0, 8)])
     outside.wait(lambda: outside.node.accounting.balance().dropped == {"time_jump": 1})
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints without odometry"] == 1)
+    outside.wait(lambda: reported(outside.node)["constraints without odometry"] == 1)
 
 
 def test_without_odometry_the_oldest_constraints_make_room(outside: Outside) -> None:
@@ -355,7 +361,7 @@ def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
     outside.send(ROUND_TRIP[:1])
     outside.wait(lambda: node.accounting.balance().dropped == {"disabled": 1})
     assert node._reset(None, Trigger.Response()).success
-    assert node.extra_diagnostics()["keyframes"] == 0
+    assert reported(node)["keyframes"] == 0
 
 
 def test_after_a_reset_the_same_constraints_are_of_the_new_map(outside: Outside) -> None:
@@ -365,7 +371,7 @@ def test_after_a_reset_the_same_constraints_are_of_the_new_map(outside: Outside)
             node._on_odometry(to_msg.odometry(word))
         for word in ROUND_TRIP:
             node._closures._on_constraint(to_msg.constraint(word))
-        outside.wait(lambda: node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+        outside.wait(lambda: reported(node)["constraints kept"] == len(ROUND_TRIP))
         outside.wait(outside.settled)
         assert node._reset(None, Trigger.Response()).success
     assert node.accounting.balance().published == 2 * len(ROUND_TRIP)
@@ -374,22 +380,22 @@ def test_after_a_reset_the_same_constraints_are_of_the_new_map(outside: Outside)
 def test_a_retracted_constraint_leaves_the_map(outside: Outside) -> None:
     outside.drive(BENT)
     outside.send(ROUND_TRIP)
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(lambda: reported(outside.node)["constraints kept"] == len(ROUND_TRIP))
     outside.node._withdraw(ROUND_TRIP[0].moments)
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP) - 1)
-    assert outside.node.extra_diagnostics()["constraints retracted"] == 1 and outside.settled()
+    outside.wait(lambda: reported(outside.node)["constraints kept"] == len(ROUND_TRIP) - 1)
+    assert reported(outside.node)["constraints retracted"] == 1 and outside.settled()
 
 
 def test_a_saved_map_is_gone_on_with(outside: Outside) -> None:
     outside.drive(BENT)
     outside.send(ROUND_TRIP)
-    outside.wait(lambda: outside.node.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(lambda: reported(outside.node)["constraints kept"] == len(ROUND_TRIP))
     outside.wait(outside.settled)
     assert outside.node._save()[0]
     outside.node._inputs = outside.node._inputs.replaced(resume=True)
     resumed = outside.node._resumed()
     outside.node._begin(resumed)
-    told = outside.node.extra_diagnostics()
+    told = reported(outside.node)
     assert (told["sessions"], told["placed in the map"], told["constraints kept"]) == (1, False, len(ROUND_TRIP))
 
 
@@ -397,8 +403,8 @@ def test_a_stamp_that_repeats_is_passed_over(outside: Outside) -> None:
     outside.drive(BENT[:5])
     outside.odom.publish(to_msg.odometry(odometry(BENT)[4]))
     outside.odom.publish(to_msg.odometry(odometry(BENT)[5]))
-    outside.wait(lambda: outside.node.extra_diagnostics()["odometry"] == 6)
-    assert outside.node.extra_diagnostics()["odometry passed over"] == 1
+    outside.wait(lambda: reported(outside.node)["odometry"] == 6)
+    assert reported(outside.node)["odometry passed over"] == 1
     assert outside.node._graph.odometry.stamps_ns[-1] == SECOND // 2
 
 

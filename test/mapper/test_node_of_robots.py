@@ -22,6 +22,7 @@ from objreg_mapper.node import MapperNode
 from objreg_ros.bridge.messages import motion_from_msg, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.data.closures import LoopClosure
+from objreg_ros.diagnostics import by_key
 from objreg_ros.geometry import pose, rotation_from_vector
 
 from .bent import SECOND, closure, odometry, square
@@ -65,11 +66,11 @@ class Fleet:
     def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
         end = time.monotonic() + seconds
         while not done():
-            assert time.monotonic() < end, f"nothing came; known is {self.node.extra_diagnostics()}"
+            assert time.monotonic() < end, f"nothing came; known is {by_key(*self.node.own_diagnostics())}"
             self.executor.spin_once(timeout_sec=0.05)
 
     def told(self, robot: str, key: str) -> Any:
-        return self.node.extra_diagnostics()[f"fleet/{robot}: {key}"]
+        return by_key(*self.node.own_diagnostics())[f"fleet/{robot}: {key}"]
 
     def drive(self, steps: range) -> None:
         """Odometry of both, pose by pose in turn."""
@@ -105,7 +106,7 @@ def test_each_robot_has_its_path_and_correction_once_closures_tie_it_to_the_firs
     for a, b in ((40, 10), (20, 20), (70, 72)):
         fleet.close(met(a, b))
     fleet.wait(lambda: fleet.corrections["b"] and fleet.paths["b"] and fleet.paths["b"][-1].poses)
-    fleet.wait(lambda: fleet.node.extra_diagnostics()["constraints kept"] == 3)
+    fleet.wait(lambda: by_key(*fleet.node.own_diagnostics())["constraints kept"] == 3)
     fleet.wait(lambda: fleet.node.accounting.balance().waiting == 0)
     frames = {robot: (told[-1].header.frame_id, told[-1].child_frame_id) for robot, told in fleet.corrections.items()}
     assert frames == {"a": ("map", "a/odom"), "b": ("map", "b/odom")}
@@ -122,7 +123,7 @@ def test_a_robot_whose_time_jumps_back_begins_a_session_and_leaves_the_other_alo
     for word in WALKS["b"][:3]:
         fleet.node._on_odometry(to_msg.odometry(word), "fleet/b")
     assert (fleet.told("b", "keyframes"), fleet.told("a", "keyframes")) == (1, keyframes)
-    assert fleet.node.extra_diagnostics()["sessions"] == 3 and fleet.told("a", "odometry passed over") == 0
+    assert by_key(*fleet.node.own_diagnostics())["sessions"] == 3 and fleet.told("a", "odometry passed over") == 0
 
 
 def test_a_closure_of_a_robot_that_is_not_named_is_dropped(fleet: Fleet) -> None:

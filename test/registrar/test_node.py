@@ -23,6 +23,7 @@ from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe
 from objreg_ros.bridge.node.diagnostics import refusal_of
 from objreg_ros.bridge.streams.keyframes_in import FromRobot
 from objreg_ros.data.closures import Reason, Rejected
+from objreg_ros.diagnostics import by_key
 from objreg_ros.geometry import pose
 from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow
 from objreg_ros.memory.store import Store
@@ -210,7 +211,7 @@ def test_a_full_store_says_what_goes(make: Making, monkeypatch: pytest.MonkeyPat
         node._publish(Outcome())
     (line,) = said
     assert "keeps 2 keyframes (max_keyframes, max_megabytes), and has forgotten the oldest 3" in line
-    assert node.extra_diagnostics()["forgotten keyframes"] == 3
+    assert by_key(*node.own_diagnostics())["forgotten keyframes"] == 3
     node.close()
 
 

@@ -22,7 +22,8 @@ from std_msgs.msg import Header
 from objreg_ros.bridge.messages import headers
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.accounting import Balance
-from objreg_ros.bridge.node.diagnostics import CONNECTED, balance_of
+from objreg_ros.bridge.node.common import CONNECTED
+from objreg_ros.bridge.node.diagnostics import balance_of
 from objreg_ros.bridge.process import profile
 
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy

@@ -12,31 +12,23 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from objreg_ros.bridge.node.accounting import Balance
+from objreg_ros.bridge.node.common import DROPPED, LATENCY, LOST, CommonDiagnostics
 from objreg_ros.data.closures import Reason, Rejected
+from objreg_ros.diagnostics import Diagnostics, by_key
 
-DROPPED = "dropped: "
-LOST = "lost in transport: "
-LATENCY = "latency "
-REJECTED = "rejected: "
-CONNECTED = "connected: "
-FOUND = "found: "
+REJECTED = "rejected: "  # before a reason, in the status of a registrar
 
 
 def diagnostic(
-    node: str,
-    now: Time,
-    balance: Balance,
-    rate_hz: float,
-    troubles: Collection[str],
-    extra: Mapping[str, object],
+    node: str, now: Time, troubles: Collection[str], common: CommonDiagnostics, *own: Diagnostics
 ) -> DiagnosticArray:
-    """One status: counts, rate, latencies per stage and what the node adds; with ``troubles`` a warning of them."""
+    """One status: what nodes have in common and what the node adds; with ``troubles`` a warning of them."""
     status = DiagnosticStatus(
         level=DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK,
         name=f"{node}: frames",
-        message="; ".join(troubles) or f"{rate_hz:.1f} frames/s",
+        message="; ".join(troubles) or f"{common.rate:.1f} frames/s",
         hardware_id="objreg_ros",
-        values=[KeyValue(key=key, value=str(value)) for key, value in {**_counts(balance, rate_hz), **extra}.items()],
+        values=_key_values(by_key(common, *own)),
     )
     return DiagnosticArray(header=Header(stamp=now), status=[status])
 
@@ -54,7 +46,7 @@ def _refusal(node: str, rejected: Rejected) -> DiagnosticStatus:
         name=f"{node}: refusal",
         message=f"{rejected.reason.value}: {rejected.detail}",
         hardware_id="objreg_ros",
-        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        values=_key_values(values),
     )
 
 
@@ -72,21 +64,8 @@ def refusal_of(status: DiagnosticStatus) -> Rejected:
     )
 
 
-def _counts(balance: Balance, rate_hz: float) -> dict[str, object]:
-    latencies = {
-        f"{LATENCY}{stage} {name} [ms]": f"{value:.2f}"
-        for stage, values in sorted(balance.stage_ms.items())
-        for name, value in zip(("p50", "p95"), values, strict=True)
-    }
-    return {
-        "received": balance.received,
-        "published": balance.published,
-        "waiting": balance.waiting,
-        **{f"{DROPPED}{reason}": count for reason, count in sorted(balance.dropped.items())},
-        **{f"{LOST}{topic}": count for topic, count in sorted(balance.lost.items())},
-        "rate [Hz]": f"{rate_hz:.2f}",
-        **latencies,
-    }
+def _key_values(values: Mapping[str, object]) -> list[KeyValue]:
+    return [KeyValue(key=key, value=str(value)) for key, value in values.items()]
 
 
 def balance_of(status: DiagnosticStatus) -> Balance:

@@ -24,7 +24,8 @@ from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.accounting import Accounting
 from objreg_ros.bridge.node.choice import Choice
-from objreg_ros.bridge.node.diagnostics import CONNECTED, FOUND, diagnostic
+from objreg_ros.bridge.node.common import MALFORMED, CommonDiagnostics
+from objreg_ros.bridge.node.diagnostics import diagnostic
 from objreg_ros.bridge.node.drops import Drops
 from objreg_ros.bridge.node.log import ThrottledLog
 from objreg_ros.bridge.node.missed import Missed
@@ -34,6 +35,7 @@ from objreg_ros.bridge.node.services import ServingNode
 from objreg_ros.bridge.node.watch import Watch
 from objreg_ros.bridge.node.worker import Worker
 from objreg_ros.bridge.process.intra_process import IntraProcessBus, LocalPublisher, LocalSubscription, ValueQueue
+from objreg_ros.diagnostics import Diagnostics
 from objreg_ros.params import Params
 from objreg_ros.plausibility.finding import Finding
 
@@ -101,9 +103,9 @@ class NodeBase(ServingNode):
         if self.is_open:
             self.adopt()
 
-    def extra_diagnostics(self) -> Mapping[str, object]:
-        """What this node adds to its diagnostics."""
-        return {}
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
+        """What this node reports beside what nodes have in common."""
+        return ()
 
     def found(self) -> Sequence[Finding]:
         """What this node finds its stream to have; a warning in its diagnostics."""
@@ -164,7 +166,7 @@ class NodeBase(ServingNode):
 
     def _ignore(self, topic: str, error: Exception, part: str) -> None:
         """Count and log what is no frame by itself and breaks its contract; ``part`` is whose drops are watched."""
-        self._ignored[self._named(f"malformed {topic}", error)] += 1
+        self._ignored[self._named(f"{MALFORMED}{topic}", error)] += 1
         self._drops.drop(part, "malformed", str(error))
         self.throttled.warn(f"malformed_{topic}", f"{topic} ignored: {error}")
 
@@ -322,14 +324,18 @@ class NodeBase(ServingNode):
         rate = (balance.received - before) / (now - then)
         stamp = self.get_clock().now().to_msg()
         name = self.get_fully_qualified_name()
-        connected = {f"{CONNECTED}{topic}": count for topic, count in sorted(self.connected.items())}
-        state = {"state": self.state} if self.is_managed else {}
-        extra = {**state, **connected, **self._ignored, **(self.extra_diagnostics() if self.is_open else {})}
-        found = self.found() if self.is_open else ()
-        extra |= {f"{FOUND}{finding.anchor}": finding.text for finding in found}
+        own, found = (self.own_diagnostics(), self.found()) if self.is_open else ((), ())
+        common = CommonDiagnostics.of(
+            balance,
+            rate,
+            state=self.state if self.is_managed else None,
+            connected=self.connected,
+            malformed={named.removeprefix(MALFORMED): count for named, count in self._ignored.items()},
+            found={finding.anchor: finding.text for finding in found},
+        )
         asked = () if self.is_enabled else ("disabled by ~/enable",)
         troubles = (*asked, *silent.values(), *self._drops.lasting().values(), *(finding.what for finding in found))
-        self._diagnostics.publish(diagnostic(name, stamp, balance, rate, troubles, extra))
+        self._diagnostics.publish(diagnostic(name, stamp, troubles, common, *own))
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
         """As rclpy, but with the error messages of `Params`, and with 1 accepted as 1.0."""

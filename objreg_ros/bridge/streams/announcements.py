@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
@@ -18,7 +19,7 @@ from visualization_msgs.msg import MarkerArray
 
 from objreg_ros.bridge.messages import closures_msg, to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.diagnostics import REJECTED, refusals
+from objreg_ros.bridge.node.diagnostics import refusals
 from objreg_ros.data.closures import LoopClosure, Observation, Rejected
 
 
@@ -81,13 +82,15 @@ class Announcements:
         """Show the scene in RViz."""
         self._markers.publish(scene)
 
-    def diagnostics(self) -> dict[str, object]:
-        """For diagnostics: constraints, refusals by reason, the last refusal of each, and what moved last."""
-        confirmed = {"constraints": self._published.total(), "constraints confirmed by others": self._published[True]}
-        refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
-        last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
-        moved = {f"last moved: {label}": f"{metres:.2f} m" for label, metres in sorted(self._last_moved.items())}
-        return {**confirmed, **refused, **last, **moved}
+    def counts(self) -> dict[str, Any]:
+        """Constraints, refusals by reason, the last refusal of each, and what moved last: fields of diagnostics."""
+        return {
+            "constraints": self._published.total(),
+            "confirmed": self._published[True],
+            "rejected": self._refused,
+            "last_rejected": self._last_refusals,
+            "last_moved": self._last_moved,
+        }
 
 
 class _Whole:

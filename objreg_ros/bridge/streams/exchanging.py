@@ -131,10 +131,6 @@ class Exchanging:
         message = CompressedImage(header=to_msg.header(stamp_ns, ""), format=FORMAT, data=data)
         publisher.publish(self._key.sign(publisher.topic_name, message))
 
-    def diagnostics(self) -> dict[str, object]:
-        """For diagnostics: what was said and received."""
-        return {f"exchange: {what}": count for what, count in sorted(self._exchange.counters.items())}
-
     def close(self) -> None:
         """Compare no more."""
         self._reader.shutdown(cancel_futures=True)

@@ -53,7 +53,7 @@ class KeyframesIn:
         key: Key | None = None,
     ) -> None:
         self._node, self._take, self._key = node, take, key or Key()
-        self._counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
+        self.counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
         self._frames = dict[tuple[str, str], str]()  # of the camera of each robot and topic
         for (robot, prefix), names in zip(prefixes.items(), cameras, strict=True):
             for camera in (f"{name}/" for name in names) if names else ("",):
@@ -90,11 +90,4 @@ class KeyframesIn:
 
     def count(self, robot: str, what: str) -> None:
         """One more keyframe of a robot of which this became."""
-        self._counts[robot, what] += 1
-
-    def diagnostics(self) -> dict[str, object]:
-        """For diagnostics: what became of the keyframes of each robot."""
-        return {
-            f"{robot}: keyframes {what}" if robot else f"keyframes {what}": count
-            for (robot, what), count in sorted(self._counts.items())
-        }
+        self.counts[robot, what] += 1

@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import chain, count
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
+from objreg_ros.bridge.node.common import StreamDiagnostics
 from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream, Synchroniser
+from objreg_ros.diagnostics import Diagnostics
 
 ALONE_S = 0.5  # after once to twice this a stamp that has leapt alone is believed, later where the stream is slow
 QUIET_S = 5.0  # where no stream has spoken for so long, what waits for an optional one goes without
@@ -111,14 +113,13 @@ class SynchronisedNode(NodeBase):
         wanted = " and ".join(map(_partner, self._sync.lacking(stamp_ns)))
         return f"expected {wanted}, got none; does its node run and keep up?"
 
-    def extra_diagnostics(self) -> Mapping[str, object]:
+    def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """What the other streams have brought, and how much of it found no partner."""
         queues = {} if self._sync is None else self._sync.queues
         others = {name: queue for name, queue in queues.items() if name != self._reference}
-        unused = {
-            f"{name} {why}": count for name, queue in others.items() for why, count in sorted(queue.dropped.items())
-        }
-        return {**{f"{name} received": queue.received for name, queue in others.items()}, **unused}
+        received = {name: queue.received for name, queue in others.items()}
+        unused = {(name, why): count for name, queue in others.items() for why, count in queue.dropped.items()}
+        return (*super().own_diagnostics(), StreamDiagnostics(received=received, unused=unused))
 
 
 def _partner(stream: Stream) -> str:

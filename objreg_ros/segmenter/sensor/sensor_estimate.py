@@ -138,15 +138,6 @@ class SensorEstimate:
             self._note_turn(image)
         return registered
 
-    def text(self) -> dict[str, str]:
-        """The known values as text, by their keys in `/diagnostics`; without those that no frame showed."""
-        noise, offset, lag = self.noise, self.depth_to_colour.text(), self.lag
-        return {
-            **({} if noise is None else {"depth noise (a Kinect v1 has 1)": f"{noise:.2f}"}),
-            **({"depth is turned against colour by": offset} if offset else {}),
-            **({} if lag is None else {"depth is behind colour by": lag.text()}),
-        }
-
     def _note_turn(self, image: DepthImage) -> None:
         """Put the offset of the frame before beside its velocity, which is known with this frame."""
         velocity, found = self._motion.see(image), self.depth_to_colour.found

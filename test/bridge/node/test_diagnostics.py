@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from objreg_ros.bridge.node.accounting import Balance
+from objreg_ros.bridge.node.common import CommonDiagnostics
 from objreg_ros.bridge.node.diagnostics import balance_of, diagnostic, refusal_of, refusals
 from objreg_ros.data.closures import Reason, Rejected
+from objreg_ros.diagnostics import Diagnostics, reading
 
 BOOKS = Balance(
     received=10,
@@ -19,8 +23,15 @@ BOOKS = Balance(
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Own(Diagnostics):
+    keyframes: int = reading("stored keyframes", "How many are stored.")
+
+
 def status(*troubles: str) -> DiagnosticStatus:
-    return diagnostic("/detector", Time(sec=4), BOOKS, 29.97, troubles, {"stored keyframes": 7}).status[0]
+    return diagnostic("/detector", Time(sec=4), troubles, CommonDiagnostics.of(BOOKS, 29.97), Own(keyframes=7)).status[
+        0
+    ]
 
 
 def test_the_books_survive_the_way_over_the_wire() -> None:

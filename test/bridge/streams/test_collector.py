@@ -15,14 +15,21 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node.accounting import Balance
+from objreg_ros.bridge.node.common import CommonDiagnostics
 from objreg_ros.bridge.node.diagnostics import diagnostic, refusals
 from objreg_ros.bridge.streams import collector as collector_module
 from objreg_ros.bridge.streams.collector import Collector
 from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.data.frames import Frame, ObjectCloud, View
 from objreg_ros.data.images import Detections, Intrinsics
+from objreg_ros.diagnostics import Diagnostics
+from objreg_ros.registrar.diagnostics import RegistrarDiagnostics
 
 NAMES = {0: "cup", 7: "tv"}
+REGISTRAR = RegistrarDiagnostics(
+    keyframes=5, objects=9, landmarks=4, sessions=1, closures=0, unsearched=0, forgotten=0, waiting_keyframes=0,
+    waiting_poses=0, without_odometry=0, constraints=0, confirmed=0, rejected={"no_candidate": 3},
+)  # fmt: skip
 BOOKS = Balance(10, 6, 1, {"overtaken": 3}, {"image": 2}, {"total": (10.0, 20.0)})
 
 
@@ -75,19 +82,19 @@ def objects(stamp_ns: int, *labels: str) -> Any:
     return to_msg.objects(frame, NAMES)
 
 
-def status(node: str, **extra: object) -> DiagnosticArray:
-    return diagnostic(node, Time(), BOOKS, 30.0, (), {key.replace("_", " "): value for key, value in extra.items()})
+def status(node: str, *own: Diagnostics, balance: Balance = BOOKS) -> DiagnosticArray:
+    return diagnostic(node, Time(), (), CommonDiagnostics.of(balance, 30.0), *own)
 
 
 def test_the_books_of_every_node_are_kept_as_they_were_told_last(collector: Collector) -> None:
-    receive(collector, "/diagnostics", diagnostic("/detector", Time(), Balance(1, 1, 0, {}, {}), 30.0, (), {}))
+    receive(collector, "/diagnostics", status("/detector", balance=Balance(1, 1, 0, {}, {})))
     receive(collector, "/diagnostics", status("/detector"))
     receive(collector, "/diagnostics", status("/robot/segmenter"))
     assert collector.counters == {"/detector": BOOKS, "/robot/segmenter": BOOKS} and collector.rejected == {}
 
 
 def test_refusals_are_counted_by_reason_and_kept_with_their_numbers(collector: Collector) -> None:
-    receive(collector, "/diagnostics", diagnostic("/registrar", Time(), BOOKS, 1.0, (), {"rejected: no_candidate": 3}))
+    receive(collector, "/diagnostics", status("/registrar", REGISTRAR))
     turned_down = Rejected(reason=Reason.NO_CANDIDATE, from_ns=5, to_ns=9, detail="none of 3")
     receive(collector, "/refusals", refusals("/registrar", Time(), [turned_down]))
     assert collector.rejected == {"no_candidate": 3} and collector.counters.keys() == {"/registrar"}

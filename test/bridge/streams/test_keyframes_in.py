@@ -45,7 +45,7 @@ def test_a_keyframe_is_handed_on_with_its_robot_and_is_in_the_books(node: Frames
     received.count("fleet/r1", "searched")
     assert taken == [FromRobot("fleet/r1", SENT)] and taken[0].nbytes == len(b"packed")
     assert node.accounting.balance().waiting == 1
-    assert received.diagnostics() == {"fleet/r1: keyframes received": 1, "fleet/r1: keyframes searched": 1}
+    assert received.counts == {("fleet/r1", "received"): 1, ("fleet/r1", "searched"): 1}
 
 
 def test_a_picture_is_dropped_and_counted_and_ends_nothing(node: FramesNode) -> None:

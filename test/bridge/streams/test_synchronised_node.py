@@ -12,6 +12,7 @@ from objreg_ros.bridge.node.log import ThrottledLog
 from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.streams.sync import JUMP_NS, PATIENCE_NS, Match, Need, Stream
 from objreg_ros.bridge.streams.synchronised_node import ALONE_S, QUIET_S, SynchronisedNode
+from objreg_ros.diagnostics import by_key
 
 PATIENCE = 20.0  # seconds; a test that gets there has failed
 
@@ -187,7 +188,7 @@ def test_streams_may_be_matched_anew_and_keep_what_is_latched(node: Pairs) -> No
     node.feed("b", 6, "b6")
     node.worker.close()
     assert node.accounting.balance().received == 2
-    assert node.extra_diagnostics() == {"c received": 1}
+    assert by_key(*node.own_diagnostics()) == {"c received": 1}
 
 
 def test_diagnostics_tell_what_the_other_streams_brought(node: Pairs) -> None:
@@ -197,5 +198,5 @@ def test_diagnostics_tell_what_the_other_streams_brought(node: Pairs) -> None:
     node.feed("b", 6, "b6")
     node.feed("a", 6, "a6")
     node.wait()
-    told = node.extra_diagnostics()
+    told = by_key(*node.own_diagnostics())
     assert told == {"b received": 2, "b unmatched": 1, "c received": 1}

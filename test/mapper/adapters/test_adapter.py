@@ -11,6 +11,7 @@ import pytest
 from objreg_mapper.adapters.adapter import Adapter
 from objreg_ros.bridge.messages import closures_msg, to_msg
 from objreg_ros.data.closures import LoopClosure, Moments
+from objreg_ros.diagnostics import by_key
 
 from .standing_by import Around, closure
 
@@ -45,7 +46,7 @@ def test_a_constraint_that_comes_by_both_topics_is_taken_once(around: Callable[.
     node = graph.start(MessagesByStamp)
     tell_whole(graph, closure())
     graph.send(closure(), closure())
-    graph.wait(lambda: node.has and node.extra_diagnostics()["repeated"] == 2)
+    graph.wait(lambda: node.has and by_key(*node.own_diagnostics())["repeated"] == 2)
     assert len(node.has) == 1 and node.accounting.balance().published == 1
 
 
@@ -106,7 +107,7 @@ def test_what_is_withdrawn_while_it_waits_never_goes_and_later_it_is_told(around
     tell_whole(graph, closure(2.0))
     graph.wait(lambda: len(node.has) == 1)
     tell_whole(graph, closure(2.0), retracted=True)
-    graph.wait(lambda: node.extra_diagnostics()["retracted too late"] == 1)
+    graph.wait(lambda: by_key(*node.own_diagnostics())["retracted too late"] == 1)
 
 
 def test_what_was_withdrawn_stays_out_when_the_other_topic_tells_it(around: Callable[..., Any]) -> None:
@@ -117,10 +118,10 @@ def test_what_was_withdrawn_stays_out_when_the_other_topic_tells_it(around: Call
     node._keys["its id"] = node.has[0]
     for _ in range(2):
         node._retract("its id")
-    assert node.extra_diagnostics()["retracted too late"] == 1
+    assert by_key(*node.own_diagnostics())["retracted too late"] == 1
     graph.send(closure(), closure(2.0))
     graph.wait(lambda: len(node.has) == 2)
-    assert node.extra_diagnostics()["repeated"] == 1
+    assert by_key(*node.own_diagnostics())["repeated"] == 1
 
 
 def test_what_is_on_its_way_is_not_pushed_out_and_is_withdrawn_too_late(
@@ -136,7 +137,7 @@ def test_what_is_on_its_way_is_not_pushed_out_and_is_withdrawn_too_late(
     assert list(node.waiting) == [asked]
     node._keys["its id"] = asked
     node._retract("its id")
-    assert node.extra_diagnostics()["retracted too late"] == 0
+    assert by_key(*node.own_diagnostics())["retracted too late"] == 0
     node.settle(asked)
-    assert node.extra_diagnostics()["retracted too late"] == 1
+    assert by_key(*node.own_diagnostics())["retracted too late"] == 1
     assert node.accounting.balance().dropped == {"queue_full": 1, "retracted": 1}

@@ -14,6 +14,7 @@ from objreg_mapper.adapters.g2o import ToG2o
 from objreg_mapper.constraint import Constraint, compensated, local_information
 from objreg_ros.bridge.messages import closures_msg, to_msg
 from objreg_ros.data.frames import Odometry
+from objreg_ros.diagnostics import by_key
 from objreg_ros.geometry import inverse, pose, rotation_from_quaternion
 
 from .standing_by import AHEAD, AHEAD_TEXT, COVARIANCE, MEASURED, body_at, closure
@@ -55,11 +56,11 @@ def test_a_retraction_takes_the_edge_out_of_the_file_again(around: Callable[...,
     graph.whole.publish(message)
     graph.drive(node, 0.0, 10.0)
     graph.wait(lambda: path.exists() and edges(path))
-    graph.wait(lambda: node.extra_diagnostics()["repeated"] == 1)
+    graph.wait(lambda: by_key(*node.own_diagnostics())["repeated"] == 1)
     message.retracted = True
     graph.whole.publish(message)
     graph.wait(lambda: not edges(path))
-    assert node.accounting.balance().published == 1 and node.extra_diagnostics()["retracted too late"] == 0
+    assert node.accounting.balance().published == 1 and by_key(*node.own_diagnostics())["retracted too late"] == 0
 
 
 def test_odometry_that_begins_anew_begins_another_file(around: Callable[..., Any], tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from objreg_mapper.adapters import rtabmap
 from objreg_mapper.adapters.rtabmap import ToRtabmap
 from objreg_mapper.constraint import Constraint, compensated, local_information
 from objreg_ros.bridge.messages import motion_from_msg, to_msg
+from objreg_ros.diagnostics import by_key
 from objreg_ros.geometry import inverse
 
 from .standing_by import AHEAD, AHEAD_TEXT, COVARIANCE, MEASURED, Around, body_at, closure
@@ -104,7 +105,7 @@ def test_it_outlives_rtabmap_and_forgets_the_nodes_of_a_database_that_is_gone(ar
     graph.send(closure())
     graph.wait(lambda: node.accounting.balance().published == 1)
     first.end()
-    graph.wait(lambda: not node.extra_diagnostics()["add_link"])
+    graph.wait(lambda: not by_key(*node.own_diagnostics())["add_link"])
     graph.send(closure(1.5, 62.25))
     graph.pass_time(0.5)
     assert node.accounting.balance().waiting == 1
@@ -187,7 +188,7 @@ def test_a_link_that_is_withdrawn_on_its_way_is_counted_once_rtabmap_has_it(
     node._keys["its id"] = closure().moments
     node._retract("its id")
     answer.set_result(rtabmap.AddLink.Response())
-    graph.wait(lambda: node.extra_diagnostics()["retracted too late"] == 1)
+    graph.wait(lambda: by_key(*node.own_diagnostics())["retracted too late"] == 1)
     assert node.accounting.balance().dropped == {"queue_full": 1, "retracted": 1}
     stand_in.end()
 
@@ -201,7 +202,7 @@ def test_a_graph_that_nobody_answers_with_is_asked_for_again(
     silent, ask = [Future()], node._get.call_async
     monkeypatch.setattr(node._get, "call_async", lambda request: silent.pop() if silent else ask(request))
     stand_in = StandIn(graph)
-    graph.wait(lambda: node.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    graph.wait(lambda: by_key(*node.own_diagnostics())["nodes of rtabmap"] == len(STAMPS))
     assert not silent and not node._wants_graph
     stand_in.end()
 
@@ -211,12 +212,12 @@ def test_news_of_another_database_in_map_data_alone_is_seen(around: Callable[...
     graph = around(f"T_base_camera:={AHEAD_TEXT}")
     node = graph.start(ToRtabmap)
     stand_in = StandIn(graph)
-    graph.wait(lambda: node.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    graph.wait(lambda: by_key(*node.own_diagnostics())["nodes of rtabmap"] == len(STAMPS))
     graph.wait(stand_in.maps.get_subscription_count)
     stand_in.stamps = (101.5, 163.25)
     stand_in.maps.publish(stand_in.map())
-    graph.wait(lambda: node.extra_diagnostics()["other databases"] == 1)
-    graph.wait(lambda: node.extra_diagnostics()["nodes of rtabmap"] == 2)
+    graph.wait(lambda: by_key(*node.own_diagnostics())["other databases"] == 1)
+    graph.wait(lambda: by_key(*node.own_diagnostics())["nodes of rtabmap"] == 2)
     stand_in.end()
 
 
@@ -225,7 +226,7 @@ def test_a_map_that_is_none_is_counted_and_ends_nothing(around: Callable[..., An
     graph = around(f"T_base_camera:={AHEAD_TEXT}")
     node = graph.start(ToRtabmap)
     stand_in = StandIn(graph)
-    graph.wait(lambda: node.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    graph.wait(lambda: by_key(*node.own_diagnostics())["nodes of rtabmap"] == len(STAMPS))
     graph.wait(stand_in.maps.get_subscription_count)
     stand_in.stamps = (-5.0,)
     stand_in.maps.publish(stand_in.map(first=9))
