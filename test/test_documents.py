@@ -134,4 +134,4 @@ def test_every_reason_for_which_nothing_matched_is_there_too() -> None:
 def test_a_link_that_leads_nowhere_is_found() -> None:
     assert found("registration/no_such_file.py") is None and found("score/free_space.py") is not None
     assert "the-clock" in anchors(REPOSITORY / "docs/wire.md")
-    assert "the-keys-of-diagnostics" in anchors(REPOSITORY / "docs/wire.md")
+    assert "why-a-closure-is-refused" in anchors(REPOSITORY / "docs/wire.md")
