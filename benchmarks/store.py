@@ -36,7 +36,7 @@ from tqdm import tqdm
 
 from objreg_ros.data.frames import ObjectCloud, View
 from objreg_ros.data.images import Intrinsics
-from objreg_ros.memory.checksum import sealed_keyframe, sealed_object
+from objreg_ros.memory.checksum import sealed
 from objreg_ros.memory.counters import Counters
 from objreg_ros.memory.descriptor import SIZE
 from objreg_ros.memory.landmarks import Landmarks
@@ -188,9 +188,9 @@ def _fill(path: Path, objects: int, draw: np.random.Generator, points: int) -> N
 def _copy_keyframes(transaction: Any, counters: Counters, shift: int, made: int) -> None:
     for found in transaction.execute("SELECT * FROM keyframe WHERE id <= ?", (made,)).fetchall():
         moment = {"id": found["id"] + shift, "stamp_ns": found["stamp_ns"] + shift * 10**9}
-        row = sealed_keyframe({**found, **moment})
-        insert(transaction, "keyframe", row)
-        counters.enter("keyframe", row)
+        insert(transaction, "keyframe", sealed("keyframe", {**found, **moment}))
+        _copy_beside(transaction, "scene", found["id"], moment["id"])
+        counters.enter("keyframe", moment["id"])
 
 
 def _copy_objects(transaction: Any, counters: Counters, shift: int, made: int, draw: np.random.Generator) -> None:
@@ -199,9 +199,15 @@ def _copy_objects(transaction: Any, counters: Counters, shift: int, made: int, d
         descriptor = np.frombuffer(row["descriptor"], np.float32) + draw.normal(0, 0.3, SIZE).astype(np.float32)
         landmark = row["landmark"] + shift // VIEWS * PER_KEYFRAME
         row.update(keyframe=row["keyframe"] + shift, landmark=landmark, descriptor=descriptor.tobytes())
-        copy = sealed_object({**row, "id": counters.next("object")})
-        insert(transaction, "object", copy)
-        counters.enter("object", copy)
+        number = counters.next("object")
+        insert(transaction, "object", sealed("object", {**row, "id": number}))
+        _copy_beside(transaction, "cloud", row["id"], number)
+        counters.enter("object", number)
+
+
+def _copy_beside(transaction: Any, table: str, number: int, copy: int) -> None:
+    found = transaction.execute(f"SELECT * FROM {table} WHERE id = ?", (number,)).fetchone()
+    insert(transaction, table, sealed(table, {**found, "id": copy}))
 
 
 def _landmark(sighting: Sighting, number: int) -> Sighting:

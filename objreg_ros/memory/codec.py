@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keyframes, sightings and closures as rows of the store, and back. Arrays become self-describing blobs.
 
-A row is sealed when it is made, and is not looked into before its seal is found whole (see `seal`).
+Each row has a checksum of all its columns, and is not looked into before that is found right. What only a keyframe that
+is read again needs, its view, context and points, is in rows of its own: the others are read without it.
 """
 
 from __future__ import annotations
 
 import json
-import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -20,37 +20,25 @@ from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import ObjectCloud, View
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project, is_rigid
-from objreg_ros.memory.checksum import (
-    require_keyframe,
-    require_light,
-    require_object,
-    require_sealed,
-    sealed,
-    sealed_keyframe,
-    sealed_object,
-)
+from objreg_ros.memory.checksum import Row, require_sealed, sealed
 from objreg_ros.memory.descriptor import SIZE
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject
 
-Row = dict[str, Any]
 PLACES = {"position": 3, "camera": 3, "R_landmark_session": 9}  # doubles in the columns of a sighting
 
 
 def pack(*arrays: Array | None) -> bytes:
-    """Arrays, some of them None, as one blob: a line of JSON with dtypes and shapes, then the bytes.
-
-    In zlib's container for its checksum, but not deflated: float points do not shrink, and it would cost 20 ms.
-    """
+    """Arrays, some of them None, as one blob: a line of JSON with dtypes and shapes, then the bytes."""
     header = [None if a is None else [a.dtype.str, list(a.shape)] for a in arrays]
     body = b"".join(np.ascontiguousarray(a).tobytes() for a in arrays if a is not None)
-    return zlib.compress(json.dumps(header).encode() + b"\n" + body, level=0)
+    return json.dumps(header).encode() + b"\n" + body
 
 
 def unpack(blob: bytes) -> tuple[Any, ...]:
     """The arrays of `pack`; ValueError if the blob is damaged."""
     try:
-        header, body = zlib.decompress(blob).split(b"\n", 1)
+        header, body = blob.split(b"\n", 1)
         arrays: list[Array | None] = []
         offset = 0
         for entry in json.loads(header):
@@ -61,14 +49,13 @@ def unpack(blob: bytes) -> tuple[Any, ...]:
             array = np.frombuffer(body, dtype, int(np.prod(shape)), offset).reshape(shape)
             offset += array.nbytes
             arrays.append(array)
-    except (zlib.error, ValueError, TypeError, IndexError, RecursionError, OverflowError) as error:
+    except (ValueError, TypeError, IndexError, RecursionError, OverflowError) as error:
         raise ValueError(f"expected a packed blob, got {len(blob)} damaged bytes ({error})") from error
     return tuple(arrays)
 
 
 def keyframe_row(keyframe: Keyframe) -> Row:
-    """The columns of a keyframe."""
-    view = keyframe.view
+    """The columns of a keyframe, but for what it shows."""
     row = {
         "id": int(keyframe.keyframe_id),
         "robot": keyframe.robot,
@@ -82,15 +69,23 @@ def keyframe_row(keyframe: Keyframe) -> Row:
         "by_odometry": int(keyframe.by_odometry),
         "gravity": _bytes(keyframe.gravity),
         "gravity_confidence": _real(keyframe.gravity_confidence),
-        "camera": camera_text(view.intrinsics),
-        "view": pack(view.xyz[..., 2], view.grey),
+        "camera": camera_text(keyframe.view.intrinsics),
+    }
+    return sealed("keyframe", row)
+
+
+def scene_row(keyframe: Keyframe) -> Row:
+    """The columns of what a keyframe shows: its view and its context."""
+    row = {
+        "id": int(keyframe.keyframe_id),
+        "view": pack(keyframe.view.xyz[..., 2], keyframe.view.grey),
         "context": pack(keyframe.context.xyz, keyframe.context.normals),
     }
-    return sealed_keyframe(row)
+    return sealed("scene", row)
 
 
 def object_row(number: int, item: KeyObject, sighting: Sighting) -> Row:
-    """The columns of one object of a keyframe, under its number in the store."""
+    """The columns of one object of a keyframe, under its number in the store, but for its points."""
     cloud = item.cloud
     row = {
         "id": int(number),
@@ -106,9 +101,13 @@ def object_row(number: int, item: KeyObject, sighting: Sighting) -> Row:
         "camera": _bytes(sighting.camera),
         "R_landmark_session": _bytes(sighting.R_landmark_session),
         "descriptor": sighting.descriptor.astype(np.float32).tobytes(),
-        "cloud": pack(cloud.xyz, cloud.normals, cloud.rgb, cloud.flags),
     }
-    return sealed_object(row)
+    return sealed("object", row)
+
+
+def cloud_row(number: int, cloud: ObjectCloud) -> Row:
+    """The columns of the points of an object, under its number in the store."""
+    return sealed("cloud", {"id": int(number), "points": pack(cloud.xyz, cloud.normals, cloud.rgb, cloud.flags)})
 
 
 def closure_row(number: int, closure: LoopClosure) -> Row:
@@ -131,22 +130,44 @@ def closure_from_row(row: Mapping[str, Any]) -> LoopClosure:
         raise ValueError(f"closure {row['id']}: expected its fields as JSON, got others ({error})") from error
 
 
-def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, Any]]) -> Keyframe:
-    """A keyframe from its row and the rows of its objects. ValueError if anything of it is damaged."""
+def require_keyframe(row: Mapping[str, Any]) -> None:
+    """ValueError unless the row of a keyframe is as it was written."""
+    require_sealed(f"keyframe {row['id']!r}", "keyframe", row)
+
+
+def require_object(row: Mapping[str, Any]) -> None:
+    """ValueError unless the row of an object is as it was written."""
+    require_sealed(f"object {row['instance']!r} of keyframe {row['keyframe']!r}", "object", row)
+
+
+def keyframe_from_rows(
+    row: Mapping[str, Any],
+    scenes: Sequence[Mapping[str, Any]],
+    objects: Sequence[Mapping[str, Any]],
+    clouds: Sequence[Mapping[str, Any]],
+) -> Keyframe:
+    """A keyframe from all its rows, ``clouds`` in the order of ``objects``. ValueError if anything of it is damaged."""
+    if len(scenes) != 1 or len(clouds) != len(objects):
+        raise ValueError(
+            f"expected a view and {len(objects)} clouds, got {len(scenes)} and {len(clouds)}: it is damaged"
+        )
+    (scene,) = scenes
     require_keyframe(row)
-    for item in objects:
+    require_sealed("its view", "scene", scene)
+    for item, cloud in zip(objects, clouds, strict=True):
         require_object(item)
+        require_sealed(f"the points of object {item['instance']!r}", "cloud", cloud)
     camera = camera_of(row["camera"])
-    depth, grey = _unpacked(row, "view", 2)
+    depth, grey = _unpacked(scene, "view", 2)
     depth = np.where(depth < limits.LEAST_RANGE, np.float32(np.nan), depth)  # of a store of before that bound
     xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)
-    context_xyz, context_normals = _unpacked(row, "context", 2)
+    context_xyz, context_normals = _unpacked(scene, "context", 2)
     return Keyframe(
         keyframe_id=row["id"],
         session=row["session"],
         stamp_ns=row["stamp_ns"],
         frame_id=row["frame_id"],
-        objects=tuple(_object(item) for item in objects),
+        objects=tuple(map(_object, objects, clouds)),
         context=Context(xyz=context_xyz, normals=context_normals),
         view=View(xyz=xyz, grey=grey, intrinsics=camera),
         gravity=_gravity(row),
@@ -162,7 +183,7 @@ def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, An
 
 def sighting_from_row(row: Mapping[str, Any], head: Mapping[str, Any]) -> Sighting:
     """A sighting from the row of its object and the head of its keyframe. ValueError if it is damaged."""
-    require_light(row)
+    require_object(row)
     try:
         return _sighting(row, head)
     except ValueError as error:
@@ -194,9 +215,9 @@ def _sighting(row: Mapping[str, Any], head: Mapping[str, Any]) -> Sighting:
     )
 
 
-def _object(row: Mapping[str, Any]) -> KeyObject:
-    xyz, normals, rgb, flags = _unpacked(row, "cloud", 4)
-    cloud = ObjectCloud(
+def _object(row: Mapping[str, Any], cloud: Mapping[str, Any]) -> KeyObject:
+    xyz, normals, rgb, flags = _unpacked(cloud, "points", 4)
+    made = ObjectCloud(
         label=row["label"],
         score=row["score"],
         instance=row["instance"],
@@ -206,7 +227,7 @@ def _object(row: Mapping[str, Any]) -> KeyObject:
         flags=flags,
         density=row["density"],
     )
-    return KeyObject(cloud=cloud, sightings=row["sightings"])
+    return KeyObject(cloud=made, sightings=row["sightings"])
 
 
 def _unpacked(row: Mapping[str, Any], name: str, arrays: int) -> tuple[Any, ...]:

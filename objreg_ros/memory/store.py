@@ -4,7 +4,7 @@
 What `Store.add` has returned from is on the disk: the file is in WAL mode with full synchronisation, and a keyframe
 with its objects and closures is one transaction, so a process that is killed at any time leaves whole keyframes. The
 log is folded into the file after each of them, so that nothing hangs on the log alone. What is read was written: every
-row has a checksum of all that it says (`seal`), and the `counters` say how many there are. Memory is bounded: only the
+row has a checksum of all its columns, and the `counters` say how many there are. Memory is bounded: only the
 last keyframes that were used stay decoded. So is the file: free space goes back to the disk.
 """
 
@@ -20,15 +20,8 @@ from typing import Any
 
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.keyframes.recent import RecentKeyframes
-from objreg_ros.memory.checksum import HEAD, require_head
 from objreg_ros.memory.claim import Claim, StoreError
-from objreg_ros.memory.codec import (
-    closure_from_row,
-    keyframe_from_rows,
-    keyframe_row,
-    object_row,
-    sighting_from_row,
-)
+from objreg_ros.memory.codec import closure_from_row, keyframe_from_rows, require_keyframe, sighting_from_row
 from objreg_ros.memory.counters import Counters, read_counters
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import opened
@@ -46,12 +39,18 @@ from objreg_ros.memory.store_file import (
     require_place,
     shrink,
 )
-from objreg_ros.memory.transaction import OBJECTS, SESSION, delete, rename_landmarks, write, write_closures
+from objreg_ros.memory.transaction import SESSION, delete, rename_landmarks, write_closures, write_keyframe
 from objreg_ros.registration.keyframe import Keyframe
 
 LEFT = "; it was left as it is. Use a copy of it or another path"
 MOST_CLOSURES = 100_000  # of 1.5 kB; the oldest are forgotten
-HEADS = f"SELECT {', '.join(HEAD)}, seal FROM keyframe ORDER BY id"
+ROWS = (  # of one keyframe
+    "SELECT * FROM keyframe WHERE id = ?",
+    "SELECT * FROM scene WHERE id = ?",
+    "SELECT * FROM object WHERE keyframe = ? ORDER BY id",
+    "SELECT cloud.* FROM cloud JOIN object USING (id) WHERE keyframe = ? ORDER BY id",
+)
+HEAD = ("id", "session", "stamp_ns", "robot", "origin", "travelled", "by_odometry")  # what is kept of each keyframe
 
 
 class Store:
@@ -80,9 +79,9 @@ class Store:
             self._connection = opened(Path(self.path), self._claim)
             undo.callback(self._connection.close)
             self._counters = read_counters(self._connection)
-            for head in self._connection.execute(HEADS):
-                require_head(head)
-                self._heads[head["id"]] = head
+            for row in self._connection.execute("SELECT * FROM keyframe ORDER BY id"):
+                require_keyframe(row)
+                self._heads[row["id"]] = {name: row[name] for name in HEAD}
             undo.pop_all()
 
     def add(
@@ -98,32 +97,27 @@ class Store:
         StoreError where it cannot be written: then nothing of it is.
         """
         with self._reporting(f"write keyframe {keyframe.keyframe_id}"), self._changing() as (transaction, counters):
-            row = keyframe_row(keyframe)
-            write(transaction, counters, "keyframe", row)
-            for item, sighting in zip(keyframe.objects, sightings, strict=True):
-                write(transaction, counters, "object", object_row(counters.next("object"), item, sighting))
-            counters.give_landmark(max((sighting.landmark for sighting in sightings), default=0))
+            write_keyframe(transaction, counters, keyframe, sightings)
             write_closures(transaction, counters, closures, MOST_CLOSURES)
-            rename_landmarks(transaction, counters, merged or {})
-        self._heads[keyframe.keyframe_id] = {name: row[name] for name in HEAD}
+            rename_landmarks(transaction, merged or {})
+        self._heads[keyframe.keyframe_id] = {"id": keyframe.keyframe_id} | {n: getattr(keyframe, n) for n in HEAD[1:]}
         self._recent.keep(keyframe)
 
     def add_closure(self, closure: LoopClosure, merged: Mapping[int, Merge]) -> None:
         """Write a closure of keyframes that are stored already; ``merged`` and StoreError as in `add`."""
         with self._reporting("write a closure"), self._changing() as (transaction, counters):
             write_closures(transaction, counters, (closure,), MOST_CLOSURES)
-            rename_landmarks(transaction, counters, merged)
+            rename_landmarks(transaction, merged)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
         """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""
         if (recent := self._recent.get(keyframe_id)) is not None:
             return recent
         with self._reporting(f"read keyframe {keyframe_id}"):
-            row = self._connection.execute("SELECT * FROM keyframe WHERE id = ?", (keyframe_id,)).fetchone()
-            if row is None:
+            rows, *others = (self._connection.execute(query, (keyframe_id,)).fetchall() for query in ROWS)
+            if not rows:
                 raise KeyError(keyframe_id)
-            objects = self._connection.execute("SELECT * FROM object WHERE keyframe = ? ORDER BY id", (keyframe_id,))
-            keyframe = keyframe_from_rows(row, objects.fetchall())
+            keyframe = keyframe_from_rows(rows[0], *others)
         self._recent.keep(keyframe)
         return keyframe
 
@@ -131,7 +125,7 @@ class Store:
         """Every stored object without its points, or those of one keyframe, oldest first."""
         only = "" if keyframe_id is None else f" WHERE keyframe = {int(keyframe_id)}"
         with self._reporting("read the objects", LEFT):
-            for row in self._connection.execute(f"{OBJECTS}{only} ORDER BY id"):
+            for row in self._connection.execute(f"SELECT * FROM object{only} ORDER BY id"):
                 if row["keyframe"] not in self._heads:
                     raise ValueError(f"object {row['id']}: expected a stored keyframe, got number {row['keyframe']}")
                 yield sighting_from_row(row, self._heads[row["keyframe"]])

@@ -15,13 +15,13 @@ from objreg_ros.memory.counters import Counters
 from objreg_ros.whole_file import whole_file
 
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
-SCHEMA_VERSION = 6  # at byte 60
+SCHEMA_VERSION = 7  # at byte 60
 OLDEST_VERSION = 5  # that of the first release
 SPARE = 2048  # pages of 4 kB that may lie free in the file: what comes next takes them
 STEP = 4096  # pages that are given back at once: 16 MB, so that no keyframe waits long
 PAGES = "page_count", "freelist_count", "page_size"
-BYTES = """SELECT (SELECT LENGTH(view) + LENGTH(context) FROM keyframe WHERE id = ?)
-  + COALESCE((SELECT SUM(LENGTH(cloud)) FROM object WHERE keyframe = ?), 0)"""
+BYTES = """SELECT (SELECT LENGTH(view) + LENGTH(context) FROM scene WHERE id = ?)
+  + COALESCE((SELECT SUM(LENGTH(points)) FROM cloud JOIN object USING (id) WHERE keyframe = ?), 0)"""
 MOST_AGAIN = 1000  # files that one second may be the date of
 SCHEMA = """
 CREATE TABLE keyframe (
@@ -29,22 +29,25 @@ CREATE TABLE keyframe (
   stamp_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
   travelled REAL NOT NULL, turned REAL NOT NULL, T_odom_camera BLOB, by_odometry INTEGER NOT NULL,
   gravity BLOB, gravity_confidence REAL NOT NULL,
-  camera TEXT NOT NULL, seal INTEGER NOT NULL, whole INTEGER NOT NULL, view BLOB NOT NULL, context BLOB NOT NULL);
+  camera TEXT NOT NULL, checksum INTEGER NOT NULL);
+CREATE TABLE scene (
+  id INTEGER PRIMARY KEY REFERENCES keyframe ON DELETE CASCADE, view BLOB NOT NULL, context BLOB NOT NULL,
+  checksum INTEGER NOT NULL);
 CREATE TABLE object (
   id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL REFERENCES keyframe ON DELETE CASCADE,
   instance INTEGER NOT NULL, landmark INTEGER NOT NULL, label TEXT NOT NULL, score REAL NOT NULL,
   extent REAL NOT NULL, sightings INTEGER NOT NULL, density REAL NOT NULL, position BLOB NOT NULL, camera BLOB NOT NULL,
-  R_landmark_session BLOB NOT NULL, descriptor BLOB NOT NULL, cloud_crc INTEGER NOT NULL, seal INTEGER NOT NULL,
-  cloud BLOB NOT NULL);
+  R_landmark_session BLOB NOT NULL, descriptor BLOB NOT NULL, checksum INTEGER NOT NULL);
+CREATE TABLE cloud (
+  id INTEGER PRIMARY KEY REFERENCES object ON DELETE CASCADE, points BLOB NOT NULL, checksum INTEGER NOT NULL);
 CREATE INDEX object_of_keyframe ON object (keyframe);
 CREATE INDEX object_of_landmark ON object (landmark);
 CREATE TABLE closure (
-  id INTEGER PRIMARY KEY, from_session INTEGER, to_session INTEGER, fields TEXT NOT NULL, seal INTEGER NOT NULL);
-CREATE TABLE books (
+  id INTEGER PRIMARY KEY, from_session INTEGER, to_session INTEGER, fields TEXT NOT NULL, checksum INTEGER NOT NULL);
+CREATE TABLE counters (
   id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL, object INTEGER NOT NULL, closure INTEGER NOT NULL,
   landmark INTEGER NOT NULL, keyframe_rows INTEGER NOT NULL, object_rows INTEGER NOT NULL,
-  closure_rows INTEGER NOT NULL, keyframe_seals INTEGER NOT NULL, object_seals INTEGER NOT NULL,
-  closure_seals INTEGER NOT NULL, forgotten INTEGER NOT NULL, seal INTEGER NOT NULL);
+  closure_rows INTEGER NOT NULL, forgotten INTEGER NOT NULL, checksum INTEGER NOT NULL);
 """
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The changes of a store's tables that are booked: rows written and deleted, landmarks renamed."""
+"""The changes of a store's tables that are counted: rows written and deleted, landmarks renamed."""
 
 from __future__ import annotations
 
@@ -10,30 +10,42 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data.closures import LoopClosure
-from objreg_ros.memory.checksum import LIGHT, require_light, sealed_light
-from objreg_ros.memory.codec import closure_row
-from objreg_ros.memory.counters import Counters, count
+from objreg_ros.memory.checksum import sealed
+from objreg_ros.memory.codec import closure_row, cloud_row, keyframe_row, object_row, require_object, scene_row
+from objreg_ros.memory.counters import Counters
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import insert
+from objreg_ros.memory.sighting import Sighting
+from objreg_ros.registration.keyframe import Keyframe
 
 OLDEST = "WHERE id IN (SELECT id FROM closure ORDER BY id LIMIT ?)"
 SESSION = "SELECT COALESCE(MAX(MAX(COALESCE(from_session, -1), COALESCE(to_session, -1))), -1) FROM closure"  # newest
-OBJECTS = f"SELECT {', '.join(LIGHT)}, seal FROM object"
 
 
 def write(transaction: sqlite3.Connection, counters: Counters, table: str, row: Mapping[str, Any]) -> None:
     """Enter a row and count it."""
     insert(transaction, table, row)
-    counters.enter(table, row)
+    counters.enter(table, row["id"])
+
+
+def write_keyframe(
+    transaction: sqlite3.Connection, counters: Counters, keyframe: Keyframe, sightings: Sequence[Sighting]
+) -> None:
+    """Enter a keyframe and its objects."""
+    write(transaction, counters, "keyframe", keyframe_row(keyframe))
+    insert(transaction, "scene", scene_row(keyframe))
+    for item, sighting in zip(keyframe.objects, sightings, strict=True):
+        number = counters.next("object")
+        write(transaction, counters, "object", object_row(number, item, sighting))
+        insert(transaction, "cloud", cloud_row(number, item.cloud))
+    counters.give_landmark(max((sighting.landmark for sighting in sightings), default=0))
 
 
 def delete(
     transaction: sqlite3.Connection, counters: Counters, table: str, where: str = "", values: Sequence[Any] = ()
 ) -> None:
     """Delete the rows of a table that ``where`` names, all without it, and count that."""
-    rows, seals = count(transaction, table, where, values)
-    transaction.execute(f"DELETE FROM {table} {where}", values)
-    counters.change(table, -rows, -seals)
+    counters.change(table, -transaction.execute(f"DELETE FROM {table} {where}", values).rowcount)
 
 
 def write_closures(
@@ -46,20 +58,19 @@ def write_closures(
         delete(transaction, counters, "closure", OLDEST, (counters.closure_rows - most,))
 
 
-def rename_landmarks(transaction: sqlite3.Connection, counters: Counters, merged: Mapping[int, Merge]) -> None:
+def rename_landmarks(transaction: sqlite3.Connection, merged: Mapping[int, Merge]) -> None:
     """Make every sighting of the landmarks that are gone one of that which stays."""
     for old, merge in merged.items():
-        _rename_landmark(transaction, counters, old, merge)
+        _rename_landmark(transaction, old, merge)
 
 
-def _rename_landmark(transaction: sqlite3.Connection, counters: Counters, old: int, merge: Merge) -> None:
+def _rename_landmark(transaction: sqlite3.Connection, old: int, merge: Merge) -> None:
     """Make every sighting of a landmark one of that which stays, in its axes."""
-    for row in transaction.execute(f"{OBJECTS} WHERE landmark = ?", (old,)).fetchall():
-        require_light(row)
+    for row in transaction.execute("SELECT * FROM object WHERE landmark = ?", (old,)).fetchall():
+        require_object(row)
         turned = merge.R_into_old @ np.frombuffer(row["R_landmark_session"]).reshape(3, 3)
-        new = sealed_light({**row, "landmark": int(merge.into), "R_landmark_session": turned.tobytes()})
+        new = sealed("object", {**row, "landmark": int(merge.into), "R_landmark_session": turned.tobytes()})
         transaction.execute(
-            "UPDATE object SET landmark = ?, R_landmark_session = ?, seal = ? WHERE id = ?",
-            (new["landmark"], new["R_landmark_session"], new["seal"], row["id"]),
+            "UPDATE object SET landmark = ?, R_landmark_session = ?, checksum = ? WHERE id = ?",
+            (new["landmark"], new["R_landmark_session"], new["checksum"], row["id"]),
         )
-        counters.change("object", 0, new["seal"] - row["seal"])

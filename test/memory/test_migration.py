@@ -6,28 +6,32 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from contextlib import closing
+from itertools import product
 from pathlib import Path
 
 import pytest
 
 from objreg_ros.memory import migration as renewal
-from objreg_ros.memory.counters import MOST_IDS, read_counters
+from objreg_ros.memory.checksum import checksum_of
+from objreg_ros.memory.counters import MOST_IDS
 from objreg_ros.memory.store import Store
 from objreg_ros.memory.store_file import SCHEMA_VERSION, StoreError
 
 DATA = Path(__file__).parent / "data" / "store_v5.db"  # written by the last code of that version
+LATER = DATA.with_name("store_v6.db")  # what the last code of version 6 made of it
 
 
-def _old(folder: Path, changes: str = "") -> Path:
+def _old(folder: Path, changes: str = "", data: Path = DATA) -> Path:
     path = folder / "place.db"
-    shutil.copy(DATA, path)
+    shutil.copy(data, path)
     with closing(sqlite3.connect(path)) as connection:
         connection.executescript(changes)
     return path
 
 
-def test_a_store_of_the_release_before_says_all_that_it_said_of_its_one_robot(tmp_path: Path) -> None:
-    path = _old(tmp_path)
+@pytest.mark.parametrize("data", [DATA, LATER])
+def test_an_older_store_says_all_that_it_said_of_its_one_robot(tmp_path: Path, data: Path) -> None:
+    path = _old(tmp_path, data=data)
     for read_only in (True, False, True):
         with closing(Store(path, read_only=read_only)) as opened:
             assert [p.name for p in tmp_path.iterdir() if p.name.endswith(".new")] == []
@@ -47,16 +51,23 @@ def test_a_store_of_the_release_before_says_all_that_it_said_of_its_one_robot(tm
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("data", "change"),
     [
-        "UPDATE keyframe SET session = 7",
-        "UPDATE object SET cloud = x'00'",
-        "UPDATE closure SET to_ns = 9",
-        "DELETE FROM closure WHERE id = 1",
+        (DATA, "UPDATE closure SET to_ns = 9"),
+        (LATER, "UPDATE closure SET to_session = 9"),
+        *product(
+            (DATA, LATER),
+            (
+                "UPDATE keyframe SET session = 7",
+                "UPDATE object SET cloud = x'00'",
+                "DELETE FROM closure WHERE id = 1",
+                "UPDATE books SET closure_seals = 0",
+            ),
+        ),
     ],
 )
-def test_an_older_store_that_was_changed_is_refused_and_left(tmp_path: Path, change: str) -> None:
-    path = _old(tmp_path, change)
+def test_an_older_store_that_was_changed_is_refused_and_left(tmp_path: Path, data: Path, change: str) -> None:
+    path = _old(tmp_path, change, data)
     before = path.read_bytes()
     with pytest.raises(StoreError, match="damaged"):
         Store(path)
@@ -78,7 +89,7 @@ def test_a_renewal_that_fails_or_is_killed_leaves_the_old_store(
         raise sqlite3.OperationalError("database or disk is full")
 
     with monkeypatch.context() as patched:
-        patched.setattr(renewal, "sealed_object", full)
+        patched.setattr(renewal, "sealed", full)
         with pytest.raises(StoreError, match=r"place\.db: cannot open: database or disk is full; it was left as it is"):
             Store(path)
         assert path.read_bytes() == DATA.read_bytes() and [p.name for p in tmp_path.iterdir()] == ["place.db"]
@@ -112,9 +123,10 @@ STRANGE = {
     "CREATE VIEW v AS SELECT * FROM keyframe": "view v",
     "ALTER TABLE object ADD COLUMN more": "object more",
     "ALTER TABLE object DROP COLUMN density": "object density",
-    "PRAGMA user_version = 0": "expected schema version 5 to 6, got 0; it was left as it is. Use another path",
-    "PRAGMA user_version = 4": "expected schema version 5 to 6, got 4; .* with objreg_ros 0.2.0 first",
-    "PRAGMA user_version = 6": "one that no store has|another or none",
+    "PRAGMA user_version = 0": "expected schema version 5 to 7, got 0; it was left as it is. Use another path",
+    "PRAGMA user_version = 4": "expected schema version 5 to 7, got 4; .* with objreg_ros 0.2.0 first",
+    "PRAGMA user_version = 6": "expected the tables of a store of version 6",
+    "PRAGMA user_version = 7": "one that no store has|another or none",
 }
 
 
@@ -132,10 +144,10 @@ def test_an_older_store_whose_ids_are_used_up_is_refused_and_left(tmp_path: Path
     path = _old(tmp_path)
     with closing(sqlite3.connect(path)) as connection:
         connection.row_factory = sqlite3.Row
-        counters = read_counters(connection)
-        counters.landmark = MOST_IDS["landmark"]
+        row = {**connection.execute("SELECT * FROM books").fetchone(), "landmark": MOST_IDS["landmark"]}
+        changed = (row["landmark"], checksum_of("books", row, "seal"))
         with connection as transaction:
-            counters.write(transaction)
+            transaction.execute("UPDATE books SET landmark = ?, seal = ?", changed)
     before = path.read_bytes()
     with pytest.raises(StoreError, match=r"place\.db: .* they are used up"):
         Store(path)

@@ -390,7 +390,7 @@ def test_a_damaged_blob_is_reported_when_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "place.db"
     store = Store(path)
     number = _add(store)
-    store._connection.execute("UPDATE keyframe SET context = x'00ff00'")
+    store._connection.execute("UPDATE scene SET context = x'00ff00'")
     store._recent.clear()
     with pytest.raises(StoreError, match=r"keyframe 1: .*damaged"):
         store.keyframe(number)
@@ -407,20 +407,22 @@ DAMAGED_OBJECTS: dict[str, object] = {
     "landmark": 7,
     "instance": "one",
     "density": 2e4,
-    "cloud_crc": 5,
+    "checksum": 5,
 }
+DAMAGED_SCENES: dict[str, object] = {"view": b"\0", "context": b"", "checksum": 7}
 DAMAGED_KEYFRAMES: dict[str, object] = {
+    "session": 3,
+    "stamp_ns": 5,
+    "travelled": 1.0,
+    "by_odometry": 2,
     "camera": '{"f": 1}',
     "gravity": NAN[:3].tobytes(),
     "T_odom_camera": NAN.tobytes(),
     "turned": 3.0,
     "frame_id": "other",
     "gravity_confidence": 0.5,
-    "view": b"\0",
-    "context": b"",
-    "whole": 7,
+    "checksum": 1,
 }
-DAMAGED_HEADS: dict[str, object] = {"session": 3, "stamp_ns": 5, "travelled": 1.0, "by_odometry": 2, "seal": 1}
 DAMAGED_CLOSURES: dict[str, object] = {"fields": '{"from_ns": 9}', "to_session": 9}
 CLOSURE = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",))
 
@@ -449,10 +451,10 @@ def test_a_damaged_object_is_named_with_its_file_and_nothing_is_touched(tmp_path
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
 
 
-@pytest.mark.parametrize("column", DAMAGED_KEYFRAMES)
-def test_a_damaged_keyframe_is_reported_when_it_is_read_and_the_others_are_not(tmp_path: Path, column: str) -> None:
+@pytest.mark.parametrize("column", DAMAGED_SCENES)
+def test_a_damaged_view_is_reported_when_it_is_read_and_the_others_are_not(tmp_path: Path, column: str) -> None:
     path = tmp_path / "place.db"
-    _damaged(path, "keyframe", column, DAMAGED_KEYFRAMES[column])
+    _damaged(path, "scene", column, DAMAGED_SCENES[column])
     store = Store(path)
     with pytest.raises(StoreError, match=r"place\.db: cannot read keyframe 1: .* it is damaged"):
         store.keyframe(1)
@@ -460,10 +462,10 @@ def test_a_damaged_keyframe_is_reported_when_it_is_read_and_the_others_are_not(t
     store.close()
 
 
-@pytest.mark.parametrize("column", DAMAGED_HEADS)
-def test_what_sightings_say_of_a_damaged_keyframe_is_refused_at_the_opening(tmp_path: Path, column: str) -> None:
+@pytest.mark.parametrize("column", DAMAGED_KEYFRAMES)
+def test_a_damaged_keyframe_is_refused_at_the_opening(tmp_path: Path, column: str) -> None:
     path = tmp_path / "place.db"
-    before = _damaged(path, "keyframe", column, DAMAGED_HEADS[column])
+    before = _damaged(path, "keyframe", column, DAMAGED_KEYFRAMES[column])
     with pytest.raises(StoreError, match=r"place\.db: cannot open: .*damaged.* or another path"):
         Store(path)
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
@@ -471,7 +473,7 @@ def test_what_sightings_say_of_a_damaged_keyframe_is_refused_at_the_opening(tmp_
 
 def test_the_points_of_an_object_are_those_that_were_written_with_it(tmp_path: Path) -> None:
     path = tmp_path / "place.db"
-    _damaged(path, "object", "cloud", pack(*[np.zeros((3, 3), np.float32)] * 2, None, np.zeros(3, np.uint16)))
+    _damaged(path, "cloud", "points", pack(*[np.zeros((3, 3), np.float32)] * 2, None, np.zeros(3, np.uint16)))
     with closing(Store(path)) as store:
         with pytest.raises(StoreError, match=r"keyframe 1: the points of object 1: .* it is damaged"):
             store.keyframe(1)
@@ -491,9 +493,9 @@ CHANGES = {
     "no closure": "DELETE FROM closure WHERE id = 2",
     "no keyframe": "DELETE FROM object WHERE keyframe = 1; DELETE FROM keyframe WHERE id = 1",
     "an object twice": "INSERT INTO object SELECT 9, keyframe, instance, landmark, label, score, extent, sightings,"
-    " density, position, camera, R_landmark_session, descriptor, cloud_crc, seal, cloud FROM object WHERE id = 1",
-    "no counters": "DELETE FROM books",
-    "other counters": "UPDATE books SET landmark = 0, keyframe = 'many'",
+    " density, position, camera, R_landmark_session, descriptor, checksum FROM object WHERE id = 1",
+    "no counters": "DELETE FROM counters",
+    "other counters": "UPDATE counters SET landmark = 0, keyframe = 'many'",
     "a trigger": "CREATE TRIGGER t AFTER INSERT ON keyframe BEGIN DELETE FROM object; END",
     "a view": "CREATE VIEW v AS SELECT * FROM keyframe",
     "a table": "CREATE TABLE t (a)",

@@ -250,7 +250,7 @@ def test_a_stored_keyframe_that_is_damaged_is_refused_and_the_others_are_tried(t
     _run(registrar, *(_frame(3.0 * k, T, True) for k, T in enumerate((HERE, AWAY, BESIDE, AWAY))))
     registrar.close()
     with sqlite3.connect(tmp_path / "place.db") as connection:
-        connection.execute("UPDATE keyframe SET context = x'00ff00' WHERE id = 1")
+        connection.execute("UPDATE scene SET context = x'00ff00' WHERE id = 1")
     connection.close()
     again = Registrar(RegistrarParams(store=str(tmp_path / "place.db")))
     closures, rejected = _run(again, _frame(100, HERE, True))

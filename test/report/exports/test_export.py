@@ -91,7 +91,7 @@ def _damage(path: Path, table: str, column: str, number: int) -> None:
         connection.execute(f"UPDATE {table} SET {column} = x'00' WHERE id = ?", (number,))
 
 
-@pytest.mark.parametrize(("table", "column"), [("keyframe", "view"), ("object", "cloud"), ("object", "position")])
+@pytest.mark.parametrize(("table", "column"), [("scene", "view"), ("cloud", "points"), ("object", "position")])
 def test_a_damaged_keyframe_is_left_out_and_named(tmp_path: Path, table: str, column: str) -> None:
     _damage(_store_of(tmp_path / "place.db", "cup", "book", "can"), table, column, 2)
     told: list[str] = []

@@ -148,7 +148,7 @@ def test_keyframes_of_our_own_tracking_are_on_its_map_and_those_of_odometry_are_
 def test_a_damaged_keyframe_is_left_out_and_told(tmp_path: Path) -> None:
     store = store_of(tmp_path / "place.db", taken(1, 0.0), taken(2, 1.0))
     with closing(sqlite3.connect(store)) as connection, connection:
-        connection.execute("UPDATE keyframe SET view = x'00' WHERE id = 2")
+        connection.execute("UPDATE scene SET view = x'00' WHERE id = 2")
     told: list[str] = []
     MapFiles(cloud=tmp_path / "map.ply").write(straight(2), store, told.append)
     assert told[0].startswith("keyframe 2 is left out: ") and len(read_ply(tmp_path / "map.ply")) > 1000
