@@ -25,15 +25,16 @@ from mutation import flipped
 from trials import Attempt, Target, WrongAnswerError
 
 from objreg_ros import limits
-from objreg_ros.memory import compact
+from objreg_ros.memory.compact import KEYFRAME as PACKED_KEYFRAME
 from objreg_ros.memory.compact import pack_keyframe, unpack_keyframe
+from objreg_ros.memory.envelope import FILTERS, FORMAT, PREFIX
+from objreg_ros.registrar import summary as messages
 from objreg_ros.registrar.exchange import Exchange
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.summary import DELIVERY, REQUEST, SUMMARY, Name, Request, pack_request
+from objreg_ros.registrar.summary import Name, Request, pack_request
 
-PREFIX = struct.Struct("<3sBII")  # kind, format, checksum of all that follows, bytes of the unpacked body
-FORMAT = 1
+SUMMARY, REQUEST, DELIVERY = (kind.mark for kind in (messages.SUMMARY, messages.REQUEST, messages.DELIVERY))
 BOMB = 64 << 20  # bytes that unpack from some thousand
 FLOOD = 1100  # messages: more than wait
 FLOODED = 0.02  # of the trials: each takes seconds
@@ -52,18 +53,18 @@ class Kind(NamedTuple):
 
 
 def _lzma(body: bytes) -> bytes:
-    return lzma.compress(body, lzma.FORMAT_RAW, filters=compact.FILTERS)
+    return lzma.compress(body, lzma.FORMAT_RAW, filters=FILTERS)
 
 
 def _unlzma(data: bytes) -> bytes:
-    return lzma.decompress(data, lzma.FORMAT_RAW, filters=compact.FILTERS)
+    return lzma.decompress(data, lzma.FORMAT_RAW, filters=FILTERS)
 
 
 def _deflated(body: bytes) -> bytes:
     return zlib.compress(body, 6)
 
 
-KEYFRAME = Kind(compact.MAGIC, _lzma, _unlzma)
+KEYFRAME = Kind(PACKED_KEYFRAME.mark, _lzma, _unlzma)
 KINDS = {what: Kind(what, _deflated, zlib.decompress) for what in (SUMMARY, REQUEST, DELIVERY)}
 
 

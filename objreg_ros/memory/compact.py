@@ -3,17 +3,13 @@
 
 The order of points stays. The store's own numbers, the id and the landmarks, do not travel.
 
-The bytes are a prefix (magic, format, checksum, size) and a body in raw LZMA2: a line of JSON, then columns of whole
-numbers. A column is a byte with its width, and the bytes of its numbers, the lowest of all numbers first.
+The body (see `envelope`) ends with columns of whole numbers. A column is a byte with its width, and the bytes of its
+numbers, the lowest of all numbers first.
 """
 
 from __future__ import annotations
 
-import json
-import lzma
-import struct
-import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,22 +23,15 @@ from objreg_ros.keyframes.columns import Columns, column
 from objreg_ros.keyframes.fewer_points import in_front, thinned
 from objreg_ros.keyframes.own_size import sized_keyframe
 from objreg_ros.memory.codec import camera_of, camera_text, gravity_of, pose_of
+from objreg_ros.memory.envelope import Head, by_lzma
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject
 
-MAGIC, FORMAT = b"OKF", 1
-PREFIX = struct.Struct("<3sBII")  # magic, format, checksum of all that follows, bytes of the unpacked body
+KEYFRAME = by_lzma(b"OKF", "a packed keyframe", limits.MOST_PACKED_KEYFRAME, limits.MOST_UNPACKED_KEYFRAME)
 MOST_BYTES = 100_000  # of a packed keyframe, for whose sake objects are thinned
 POINT_BYTES = 3.0  # what one point of an object less saves, about
 SPARE_BYTES = 500  # that thinning leaves below the bound
 ROUNDS = 4  # of thinning
-MOST_SAID = 300  # characters of what was wrong
 MOST_WHOLE = 2**63 - 1
-
-FILTERS = [  # half the time of the usual ones for one byte in sixty
-    {"id": lzma.FILTER_LZMA2, "preset": 6, "dict_size": 1 << 20, "lc": 0, "lp": 0, "pb": 0}
-    | {"mf": lzma.MF_HC3, "nice_len": 16, "depth": 4}
-]
-Head = Mapping[str, Any]
 
 
 def pack_keyframe(keyframe: Keyframe, most_bytes: int = MOST_BYTES) -> bytes:
@@ -58,11 +47,6 @@ def pack_keyframe(keyframe: Keyframe, most_bytes: int = MOST_BYTES) -> bytes:
             break
         kept = thinned(kept, (len(packed) - most_bytes + SPARE_BYTES) / POINT_BYTES)
         packed = _packed(kept)
-    if len(packed) > limits.MOST_PACKED_KEYFRAME:
-        most = limits.MOST_PACKED_KEYFRAME
-        raise ValueError(
-            f"expected a keyframe of at most {most} packed bytes, got {len(packed)}; make its view smaller"
-        )
     return packed
 
 
@@ -71,53 +55,19 @@ def unpack_keyframe(packed: bytes) -> Keyframe:
 
     ValueError if it is damaged, of another format, or too large.
     """
-    body = _decompressed(packed)
-    line, _, rest = body.partition(b"\n")
-    try:
-        head = json.loads(line)
-        columns = Columns(rest)
-        keyframe = _keyframe(head, columns)
-        columns.require_end()
-    except (LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:
-        raise ValueError(
-            f"expected a packed keyframe, got {len(packed)} bytes that are none ({str(error)[:MOST_SAID]})"
-        ) from error
-    return sized_keyframe(keyframe)
+    return sized_keyframe(KEYFRAME.unpack(packed, _read))
+
+
+def _read(head: Head, body: bytes) -> Keyframe:
+    columns = Columns(body)
+    keyframe = _keyframe(head, columns)
+    columns.require_end()
+    return keyframe
 
 
 def _packed(keyframe: Keyframe) -> bytes:
-    columns = b"".join((*_view_columns(keyframe.view), *_context_columns(keyframe), *_object_columns(keyframe.objects)))
-    body = json.dumps(_head(keyframe), ensure_ascii=False, allow_nan=False).encode() + b"\n" + columns
-    if len(body) > limits.MOST_UNPACKED_KEYFRAME:
-        most = limits.MOST_UNPACKED_KEYFRAME
-        raise ValueError(f"expected a keyframe of at most {most} bytes, got {len(body)}; make its view smaller")
-    sealed = struct.pack("<I", len(body)) + lzma.compress(body, lzma.FORMAT_RAW, filters=FILTERS)
-    return PREFIX.pack(MAGIC, FORMAT, zlib.crc32(sealed), len(body)) + sealed[4:]
-
-
-def _decompressed(packed: bytes) -> bytes:
-    """The body, of which no more is unpacked than it says and than may be."""
-    if not PREFIX.size < len(packed) <= limits.MOST_PACKED_KEYFRAME:
-        most = limits.MOST_PACKED_KEYFRAME
-        raise ValueError(f"expected a packed keyframe of {PREFIX.size + 1} to {most} bytes, got {len(packed)}")
-    magic, form, checksum, size = PREFIX.unpack_from(packed)
-    if (magic, form) != (MAGIC, FORMAT):
-        raise ValueError(
-            f"expected a packed keyframe, {MAGIC!r} of format {FORMAT}, got {magic!r} of format {form}; "
-            "both ends must run the same version"
-        )
-    if checksum != (got := zlib.crc32(packed[PREFIX.size - 4 :])):
-        raise ValueError(f"expected a packed keyframe with the checksum {checksum:08x}, got {got:08x}; it was damaged")
-    if size > limits.MOST_UNPACKED_KEYFRAME:
-        raise ValueError(f"expected at most {limits.MOST_UNPACKED_KEYFRAME} bytes of a keyframe, got {size}")
-    reader = lzma.LZMADecompressor(lzma.FORMAT_RAW, filters=FILTERS)
-    try:
-        body = reader.decompress(packed[PREFIX.size :], size + 1)
-    except lzma.LZMAError as error:
-        raise ValueError(f"expected a packed keyframe, got what LZMA cannot read ({error})") from error
-    if len(body) != size or not reader.eof or reader.unused_data:
-        raise ValueError(f"expected a body of {size} bytes and nothing after it, got {len(body)} or another end")
-    return body
+    columns = (*_view_columns(keyframe.view), *_context_columns(keyframe), *_object_columns(keyframe.objects))
+    return KEYFRAME.pack(_head(keyframe), b"".join(columns))
 
 
 def _head(keyframe: Keyframe) -> dict[str, Any]:

@@ -1,47 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """What registrars say to each other, as bytes: the summary of a keyframe, the request for it, and the keyframe itself.
 
-The bytes are a prefix (which of the three, format, checksum, size) and a body that is deflated: a line of JSON, then
-the objects' positions in float32 and descriptors in float16, or a packed keyframe.
+Each is in an `envelope`: the objects' positions in float32 and descriptors in float16, or a packed keyframe, follow its
+head.
 """
 
 from __future__ import annotations
 
 import json
 import re
-import struct
-import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from objreg_ros import limits
 from objreg_ros.data.checked import Array
 from objreg_ros.keyframes.frame_window import Clock
-from objreg_ros.memory.compact import MOST_SAID, MOST_WHOLE, pack_keyframe, real, text, unpack_keyframe, whole, within
+from objreg_ros.memory.compact import MOST_WHOLE, pack_keyframe, real, text, unpack_keyframe, whole, within
 from objreg_ros.memory.descriptor import SIZE
+from objreg_ros.memory.envelope import MOST_SAID, Head, by_zlib
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.keyframe import Keyframe
 
-SUMMARY, REQUEST, DELIVERY = b"OXS", b"OXR", b"OXD"
-FORMAT = 1
-PREFIX = struct.Struct("<3sBII")  # kind, format, checksum of all that follows, bytes of the unpacked body
-MOST = {
-    SUMMARY: (limits.MOST_SUMMARY, limits.MOST_UNPACKED_SUMMARY),
-    REQUEST: (limits.MOST_SUMMARY, limits.MOST_UNPACKED_SUMMARY),
-    DELIVERY: (limits.MOST_PACKED_KEYFRAME, limits.MOST_PACKED_KEYFRAME),
-}
-"""Bytes of each kind, packed and unpacked."""
-
+SUMMARY = by_zlib(b"OXS", "a summary", limits.MOST_SUMMARY, limits.MOST_UNPACKED_SUMMARY)
+REQUEST = by_zlib(b"OXR", "a request", limits.MOST_SUMMARY, limits.MOST_UNPACKED_SUMMARY)
+DELIVERY = by_zlib(b"OXD", "a delivery", limits.MOST_PACKED_KEYFRAME, limits.MOST_PACKED_KEYFRAME)
 MOST_DESCRIPTOR = 100.0  # of a part of one
 MOST_VOTES = 1e9
 MOST_RUNS = 64  # of other registrars, that are known and that a summary names
 MOST_HEAD = 1024  # bytes in which the name of a message is
 NAMED = re.compile(r'\{"run":"(?:[^"\\]|\\.)*","keyframe":\d+')
-Head = Mapping[str, Any]
-T = TypeVar("T")
 
 
 class Name(NamedTuple):
@@ -98,33 +88,33 @@ def pack_summary(summary: Summary) -> bytes:
     }
     positions = np.array([sighting.position for sighting in summary.sightings], "<f4")
     descriptors = np.array([sighting.descriptor for sighting in summary.sightings], "<f2")
-    return _sealed(SUMMARY, head, positions.tobytes() + descriptors.tobytes())
+    return SUMMARY.pack(head, positions.tobytes() + descriptors.tobytes())
 
 
 def unpack_summary(packed: bytes) -> Summary:
     """The summary of `pack_summary`; ValueError if it is damaged, of another format, or too large."""
-    return _read(SUMMARY, packed, _summary)
+    return SUMMARY.unpack(packed, _summary)
 
 
 def pack_request(request: Request) -> bytes:
     """A request as bytes."""
     run, number = request.name
-    return _sealed(REQUEST, {"run": run, "keyframe": number, "votes": request.votes, "asker": request.asker})
+    return REQUEST.pack({"run": run, "keyframe": number, "votes": request.votes, "asker": request.asker})
 
 
 def unpack_request(packed: bytes) -> Request:
     """The request of `pack_request`; ValueError as in `unpack_summary`."""
-    return _read(REQUEST, packed, lambda head, _: _request(head))
+    return REQUEST.unpack(packed, lambda head, _: _request(head))
 
 
 def pack_delivery(run: str, keyframe: Keyframe) -> bytes:
     """A keyframe under its name, as bytes; ValueError if it is too large for it."""
-    return _sealed(DELIVERY, {"run": run, "keyframe": keyframe.keyframe_id}, pack_keyframe(keyframe))
+    return DELIVERY.pack({"run": run, "keyframe": keyframe.keyframe_id}, pack_keyframe(keyframe))
 
 
 def unpack_delivery(packed: bytes) -> tuple[Name, Keyframe]:
     """The keyframe of `pack_delivery`, with id 0 and without a robot; ValueError as in `unpack_summary`."""
-    return _read(DELIVERY, packed, lambda head, rest: (_name(head), unpack_keyframe(rest)))
+    return DELIVERY.unpack(packed, lambda head, rest: (_name(head), unpack_keyframe(rest)))
 
 
 def name_of(packed: bytes) -> Name:
@@ -133,12 +123,12 @@ def name_of(packed: bytes) -> Name:
     Nothing else of the bytes is checked.
     """
     try:
-        start = zlib.decompressobj().decompress(packed[PREFIX.size :], MOST_HEAD).decode(errors="ignore")
+        start = SUMMARY.unpack_start(packed, MOST_HEAD).decode(errors="ignore")
         named = NAMED.match(start)
         if named is None:
             raise ValueError(f"got {start[:40]!r}")
         return _name(json.loads(f"{named[0]}}}"))
-    except (zlib.error, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"expected a name, got {len(packed)} bytes without ({str(error)[:MOST_SAID]})") from error
 
 
@@ -208,48 +198,3 @@ def _bounded(name: str, numbers: Array, most: float) -> Array:
     if not (np.abs(numbers) <= most).all():
         raise ValueError(f"{name}: expected numbers up to {most:g}, got {np.abs(numbers).max():g}")
     return numbers.astype(float)
-
-
-def _sealed(kind: bytes, head: Head, rest: bytes = b"") -> bytes:
-    body = json.dumps(head, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode() + b"\n" + rest
-    size = struct.pack("<I", len(body))
-    packed = zlib.compress(body, 9)
-    sealed = PREFIX.pack(kind, FORMAT, zlib.crc32(size + packed), len(body)) + packed
-    most_packed, most = MOST[kind]
-    if len(sealed) > most_packed or len(body) > most:
-        raise ValueError(f"expected at most {most_packed} bytes to be sent, got {len(sealed)}; show fewer objects")
-    return sealed
-
-
-def _read(kind: bytes, packed: bytes, made: Callable[[Head, bytes], T]) -> T:
-    line, _, rest = _body(kind, packed).partition(b"\n")
-    try:
-        return made(json.loads(line), rest)
-    except (LookupError, TypeError, AttributeError, ValueError, RecursionError, OverflowError) as error:
-        raise ValueError(
-            f"expected {kind!r} of a registrar, got {len(packed)} bytes that are none ({str(error)[:MOST_SAID]})"
-        ) from error
-
-
-def _body(kind: bytes, packed: bytes) -> bytes:
-    """What is sealed, of which no more is unpacked than it says and than may be."""
-    most_packed, most = MOST[kind]
-    if not PREFIX.size < len(packed) <= most_packed:
-        raise ValueError(f"expected {kind!r} of {PREFIX.size + 1} to {most_packed} bytes, got {len(packed)}")
-    said, form, checksum, size = PREFIX.unpack_from(packed)
-    if (said, form) != (kind, FORMAT):
-        raise ValueError(
-            f"expected {kind!r} of format {FORMAT}, got {said!r} of format {form}; both ends must run the same version"
-        )
-    if checksum != (got := zlib.crc32(packed[PREFIX.size - 4 :])):
-        raise ValueError(f"expected {kind!r} with the checksum {checksum:08x}, got {got:08x}; it was damaged")
-    if size > most:
-        raise ValueError(f"expected at most {most} bytes of {kind!r}, got {size}")
-    reader = zlib.decompressobj()
-    try:
-        body = reader.decompress(packed[PREFIX.size :], size + 1)
-    except zlib.error as error:
-        raise ValueError(f"expected {kind!r}, got what cannot be inflated ({error})") from error
-    if len(body) != size or not reader.eof or reader.unused_data:
-        raise ValueError(f"expected a body of {size} bytes and nothing after it, got {len(body)} or another end")
-    return body

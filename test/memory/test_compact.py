@@ -22,7 +22,8 @@ from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.memory import compact
-from objreg_ros.memory.compact import pack_keyframe, unpack_keyframe
+from objreg_ros.memory.compact import KEYFRAME, pack_keyframe, unpack_keyframe
+from objreg_ros.memory.envelope import FILTERS, FORMAT, PREFIX
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.warm import drawn
 from objreg_ros.registration.keyframe import Keyframe
@@ -41,15 +42,15 @@ PACKED = pack_keyframe(PLACE)
 QUICK = [{"id": lzma.FILTER_LZMA2, "preset": 0, "dict_size": 1 << 20}]  # read as what others wrote
 
 
-def sealed(body: bytes, size: int | None = None, form: int = compact.FORMAT, magic: bytes = compact.MAGIC) -> bytes:
+def sealed(body: bytes, size: int | None = None, form: int = FORMAT, magic: bytes = KEYFRAME.mark) -> bytes:
     """Bytes with a checksum that holds."""
     said = struct.pack("<I", len(body) if size is None else size)
     rest = lzma.compress(body, lzma.FORMAT_RAW, filters=QUICK)
-    return compact.PREFIX.pack(magic, form, zlib.crc32(said + rest), *struct.unpack("<I", said)) + rest
+    return PREFIX.pack(magic, form, zlib.crc32(said + rest), *struct.unpack("<I", said)) + rest
 
 
 def body_of(packed: bytes) -> bytes:
-    return lzma.decompress(packed[compact.PREFIX.size :], lzma.FORMAT_RAW, filters=compact.FILTERS)
+    return lzma.decompress(packed[PREFIX.size :], lzma.FORMAT_RAW, filters=FILTERS)
 
 
 def changed(change: Change) -> bytes:
@@ -131,11 +132,10 @@ def test_objects_are_thinned_until_the_bytes_are_few_enough() -> None:
 
 
 def test_a_keyframe_that_nobody_would_read_is_not_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, bound in (("MOST_PACKED_KEYFRAME", len(PACKED) - 1), ("MOST_UNPACKED_KEYFRAME", 1000)):
-        with monkeypatch.context() as patch:
-            patch.setattr(limits, name, bound)
-            with pytest.raises(ValueError, match=f"at most {bound} (packed )?bytes, got .*make its view smaller"):
-                pack_keyframe(PLACE)
+    for name, bound in (("most_packed", len(PACKED) - 1), ("most_unpacked", 1000)):
+        monkeypatch.setattr(compact, "KEYFRAME", replace(KEYFRAME, **{name: bound}))
+        with pytest.raises(ValueError, match=f"at most {bound} bytes.*, got .*make the view smaller"):
+            pack_keyframe(PLACE)
 
 
 def test_every_truncation_is_refused() -> None:
@@ -167,12 +167,12 @@ def test_a_body_of_anything_under_a_checksum_that_holds_is_refused_or_a_keyframe
 
 
 @settings(max_examples=60, deadline=None, database=None)
-@given(st.binary(min_size=1, max_size=40), st.integers(0, len(PACKED) - compact.PREFIX.size - 1))
+@given(st.binary(min_size=1, max_size=40), st.integers(0, len(PACKED) - PREFIX.size - 1))
 def test_damaged_compression_under_a_checksum_that_holds_is_refused(noise: bytes, at: int) -> None:
-    size, rest = PACKED[compact.PREFIX.size - 4 : compact.PREFIX.size], PACKED[compact.PREFIX.size :]
+    size, rest = PACKED[PREFIX.size - 4 : PREFIX.size], PACKED[PREFIX.size :]
     for hostile in (rest[:at], rest[:at] + noise + rest[at + len(noise) + 1 :], rest + noise):
         checksum = zlib.crc32(size + hostile)
-        packed = compact.PREFIX.pack(compact.MAGIC, compact.FORMAT, checksum, *struct.unpack("<I", size)) + hostile
+        packed = PREFIX.pack(KEYFRAME.mark, FORMAT, checksum, *struct.unpack("<I", size)) + hostile
         with pytest.raises(ValueError, match="expected"):
             unpack_keyframe(packed)
 
@@ -254,7 +254,7 @@ def test_a_bomb_takes_no_memory(size: int) -> None:
     assert len(bomb) < limits.MOST_PACKED_KEYFRAME
     tracemalloc.start()
     try:
-        with pytest.raises(ValueError, match=r"expected (a body of|at most 4000000 bytes)"):
+        with pytest.raises(ValueError, match=r"expected (a body of|a packed keyframe of at most 4000000 bytes)"):
             unpack_keyframe(bomb)
         assert tracemalloc.get_traced_memory()[1] < 4 * limits.MOST_UNPACKED_KEYFRAME
     finally:

@@ -162,7 +162,7 @@ def test_a_session_of_another_that_a_stored_closure_names_keeps_its_number_to_it
 
 
 def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(summary.MOST, summary.SUMMARY, (1000, 1000))
+    monkeypatch.setattr(summary, "SUMMARY", replace(summary.SUMMARY, most_packed=1000, most_unpacked=1000))
     a = Robot("a")
     seen = _frame(10, HERE)
     named = [replace(seen.objects[0], label=f"{k:0900d}", instance=k + 1) for k in range(480)]

@@ -20,12 +20,10 @@ from registration.samples import box, keyframe
 from objreg_ros import limits
 from objreg_ros.keyframes.frame_window import Clock
 from objreg_ros.memory.compact import pack_keyframe
+from objreg_ros.memory.envelope import FORMAT, PREFIX
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.registrar import summary as module
 from objreg_ros.registrar.summary import (
-    DELIVERY,
-    REQUEST,
-    SUMMARY,
     Name,
     Request,
     Summary,
@@ -38,6 +36,7 @@ from objreg_ros.registrar.summary import (
 )
 from objreg_ros.registration.keyframe import Keyframe
 
+SUMMARY, REQUEST, DELIVERY = (kind.mark for kind in (module.SUMMARY, module.REQUEST, module.DELIVERY))
 THINGS = tuple(box(label, (0.3 * k, 0.0, 1.0), instance=k) for k, label in enumerate(("cup", "tasse à thé", "book")))
 PLACE: Keyframe = replace(keyframe(7, 12.5, THINGS, session=3), robot="robot2", by_odometry=True, travelled=4.25)
 TOLD = Summary(
@@ -55,15 +54,15 @@ READERS: dict[bytes, Callable[[bytes], Any]] = {
 }
 
 
-def sealed(kind: bytes, body: bytes, size: int | None = None, form: int = module.FORMAT) -> bytes:
+def sealed(kind: bytes, body: bytes, size: int | None = None, form: int = FORMAT) -> bytes:
     """Bytes with a checksum that holds."""
     said = struct.pack("<I", len(body) if size is None else size)
     rest = zlib.compress(body)
-    return module.PREFIX.pack(kind, form, zlib.crc32(said + rest), *struct.unpack("<I", said)) + rest
+    return PREFIX.pack(kind, form, zlib.crc32(said + rest), *struct.unpack("<I", said)) + rest
 
 
 def body_of(packed: bytes) -> bytes:
-    return zlib.decompress(packed[module.PREFIX.size :])
+    return zlib.decompress(packed[PREFIX.size :])
 
 
 def test_a_summary_comes_back_with_what_retrieval_needs() -> None:
@@ -102,7 +101,7 @@ def test_none_is_taken_for_another(kind: bytes) -> None:
 
 def test_every_truncation_and_what_follows_is_refused() -> None:
     for end in range(len(PACKED)):
-        with pytest.raises(ValueError, match="expected b'OXS'"):
+        with pytest.raises(ValueError, match="expected a summary"):
             unpack_summary(PACKED[:end])
     with pytest.raises(ValueError, match="checksum"):
         unpack_summary(PACKED + b"\0")
@@ -151,7 +150,7 @@ def test_a_lie_is_named(lie: Callable[[dict[str, Any]], None], said: str) -> Non
     line, rest = body_of(PACKED).split(b"\n", 1)
     head = json.loads(line)
     lie(head)
-    with pytest.raises(ValueError, match="expected b'OXS' of a registrar, got") as told:
+    with pytest.raises(ValueError, match="expected a summary, got") as told:
         unpack_summary(sealed(SUMMARY, json.dumps(head).encode() + b"\n" + rest))
     assert said in str(told.value)
 
@@ -169,7 +168,7 @@ def test_a_bomb_takes_no_memory(size: int) -> None:
     assert len(bomb) < limits.MOST_SUMMARY
     tracemalloc.start()
     try:
-        with pytest.raises(ValueError, match=r"expected (a body of|at most 400000 bytes)"):
+        with pytest.raises(ValueError, match=r"expected (a body of|a summary of at most 400000 bytes)"):
             unpack_summary(bomb)
         assert tracemalloc.get_traced_memory()[1] < 8 * limits.MOST_UNPACKED_SUMMARY
     finally:
@@ -177,10 +176,10 @@ def test_a_bomb_takes_no_memory(size: int) -> None:
 
 
 def test_what_is_too_large_is_neither_read_nor_written() -> None:
-    with pytest.raises(ValueError, match="expected b'OXR' of 13 to 100000 bytes, got 100001"):
+    with pytest.raises(ValueError, match="expected a request of 13 to 100000 bytes, got 100001"):
         unpack_request(bytes(100_001))
     many = replace(TOLD, sightings=tuple(replace(one, label="x" * 1000) for one in TOLD.sightings * 200))
-    with pytest.raises(ValueError, match="expected at most 100000 bytes to be sent, got"):
+    with pytest.raises(ValueError, match="expected a summary of at most 400000 bytes unpacked, got"):
         pack_summary(many)
 
 
