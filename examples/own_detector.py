@@ -27,7 +27,7 @@ def main() -> None:
     pictures = (shots[0].rgb, shots[0].depth, shots[1].rgb, shots[1].depth)
     for detector in (boxes, masks):
         result = register(*pictures, camera, detector=detector)
-        answer = f"refused: {result.reason}" if result.T_1_2 is None else f"moved by {result.T_1_2[:3, 3].round(3)} m"
+        answer = f"moved by {result.T_1_2[:3, 3].round(3)} m" if result.accepted else f"refused: {result.reason}"
         print(f"{detector.__name__}: {answer}, {result.evidence.get('matched', 0):.0f} objects matched")
 
 

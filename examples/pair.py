@@ -18,7 +18,7 @@ def main() -> None:
     result = register(first.rgb, first.depth, second.rgb, second.depth, camera)
     for name, number in result.evidence.items():
         print(f"{name:>22} {number:.3f}")
-    if result.T_1_2 is None:
+    if not result.accepted:
         print(f"refused: {result.reason}, {result.detail}")
         return
     degrees, cm = pose_error(result.T_1_2, inverse(first.T_world_camera) @ second.T_world_camera)

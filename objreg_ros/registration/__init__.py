@@ -51,7 +51,7 @@ def align(
     from objreg_ros.registration.candidate import Candidate
     from objreg_ros.registration.certainty.covariance import covariance_of
     from objreg_ros.registration.params import RegistrationParams
-    from objreg_ros.registration.result import Registration, evidence_of
+    from objreg_ros.registration.result import AcceptedRegistration, RefusedRegistration, evidence_of
 
     params = params or RegistrationParams()
     method, gate = method or method_of(params), gate or gate_of(params)
@@ -62,10 +62,10 @@ def align(
     verdict = gate(candidates, prior)
     if isinstance(verdict, Candidate):
         T, C, evidence = verdict.T_target_source, covariance_of(verdict, params), evidence_of(verdict)
-        return Registration(accepted=True, T_target_source=T, covariance=C, evidence=evidence, candidate=verdict)
+        return AcceptedRegistration(T_target_source=T, covariance=C, evidence=evidence, candidate=verdict)
     (reason, detail), best = verdict, next(iter(candidates), None)
     evidence = {} if best is None else evidence_of(best)
-    return Registration(accepted=False, reason=reason, detail=detail, evidence=evidence, candidate=best)
+    return RefusedRegistration(reason=reason, detail=detail, evidence=evidence, candidate=best)
 
 
 def method_of(params: RegistrationParams) -> Method:

@@ -132,8 +132,11 @@ class Engine:
         Its evidence stays that of the pose with the best view score.
         """
         C = covariance_of(candidate, self._params) + candidate.systematic_depth_error
-        step = gravity_update(pair.source, pair.target, candidate.T_target_source, C)
-        return candidate if step is None else self._informed(brought(candidate, step.T), step.information)
+        update = gravity_update(pair.source, pair.target, candidate.T_target_source, C)
+        if update is None:
+            return candidate
+        T_target_source, information = update
+        return self._informed(brought(candidate, T_target_source), information)
 
     def _refined(self, pair: Pair, T_target_source: Array) -> Alignment:
         """The refined pose; where that is known badly, the one of the best view score of all that it could be."""

@@ -19,7 +19,7 @@ from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.result import Registration
+from objreg_ros.registration.result import AcceptedRegistration, RefusedRegistration, Registration
 from registrar.test_consistency import ASIDE, TRUE, passes
 
 PARAMS = RegistrarParams(confirm_seconds=10.0)
@@ -52,9 +52,9 @@ def tried(at_m: float, T: Array = TRUE, by_odometry: bool = True, **evidence: ob
         for number, way in ((2, 100 + at_m), (1, at_m))
     )
     if isinstance(verdict, tuple):
-        told = Registration(accepted=False, reason=verdict[0], detail=verdict[1], candidate=found)
+        told = RefusedRegistration(reason=verdict[0], detail=verdict[1], candidate=found)
     else:
-        told = Registration(accepted=True, candidate=found)
+        told = AcceptedRegistration(T_target_source=found.T_target_source, covariance=np.eye(6), candidate=found)
     return Pair(source, target, None, told)
 
 
@@ -188,4 +188,4 @@ def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() 
 
 def test_a_gate_that_refuses_without_a_reason_is_an_error() -> None:
     with pytest.raises(ValueError, match="expected a reason with each refusal, got None"):
-        Confirmation(PARAMS).receive(*tried(0.0)._replace(registration=Registration(accepted=False)))
+        Confirmation(PARAMS).receive(*tried(0.0)._replace(registration=RefusedRegistration(reason=None)))

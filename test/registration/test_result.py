@@ -11,7 +11,7 @@ from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from
 from objreg_ros.registration.candidate import KeypointAgreement
 from objreg_ros.registration.gate.kinds import KINDS, readings_of
 from objreg_ros.registration.gate.likelihood import log_odds, odds_of
-from objreg_ros.registration.result import Registration, evidence_of
+from objreg_ros.registration.result import AcceptedRegistration, RefusedRegistration, evidence_of
 from registration.samples import candidate
 
 
@@ -21,7 +21,7 @@ def motion(seed: int, scale: float = 1.0) -> np.ndarray:
 
 
 def test_a_refusal_has_no_pose_between_any_cameras() -> None:
-    refused = Registration(accepted=False, reason=Reason.SLACK, detail="1 of 6", candidate=candidate())
+    refused = RefusedRegistration(reason=Reason.SLACK, detail="1 of 6", candidate=candidate())
     assert refused.T_1_2 is None and refused.covariance is None
     assert refused.between(motion(1), motion(2)) is refused
 
@@ -29,7 +29,7 @@ def test_a_refusal_has_no_pose_between_any_cameras() -> None:
 def test_between_other_cameras_the_covariance_is_that_of_many_disturbed_poses() -> None:
     T, before, behind = motion(1), motion(2), motion(3)
     sigma = 1e-3 * np.array([1.0, 2.0, 3.0, 0.5, 1.5, 1.0])
-    moved = Registration(accepted=True, T_target_source=T, covariance=np.diag(sigma**2)).between(before, behind)
+    moved = AcceptedRegistration(T_target_source=T, covariance=np.diag(sigma**2)).between(before, behind)
     assert moved.T_1_2 is not None and moved.covariance is not None
     np.testing.assert_allclose(moved.T_1_2, before @ T @ behind)
     errors = []

@@ -42,15 +42,10 @@ def _upright(view: Prepared) -> tuple[Array, float]:
     return (UPRIGHT, UPRIGHT_SIGMA_DEG) if view.up is None else (view.up, view.up_sigma_deg)
 
 
-class GravityUpdate(NamedTuple):
-    """A pose ``T (4, 4)`` nearer to where gravity is kept, and the ``information (6, 6)`` [t r] that gravity adds."""
+def gravity_update(source: Prepared, target: Prepared, T_target_source: Array, C: Array) -> tuple[Array, Array] | None:
+    """The pose (4, 4) moved to where gravity is kept, and the information (6, 6) [t r] that gravity adds.
 
-    T: Array
-    information: Array
-
-
-def gravity_update(source: Prepared, target: Prepared, T_target_source: Array, C: Array) -> GravityUpdate | None:
-    """The pose moved to where gravity is kept, as far as its covariance ``C (6, 6)`` [t r] leaves that open.
+    It moves as far as its covariance ``C (6, 6)`` [t r] leaves that open.
 
     Gravity from a single view hardly counts here: its planes are those that hold the pose. None where one
     gravity is unknown.
@@ -64,4 +59,4 @@ def gravity_update(source: Prepared, target: Prepared, T_target_source: Array, C
     gain = C @ turns.T @ np.linalg.inv(turns @ C @ turns.T + variance * np.eye(3))
     step = gain @ (target.up - carried)
     moved = rotation_from_vector(step[3:]) @ T_target_source[:3, :3], T_target_source[:3, 3] + step[:3]
-    return GravityUpdate(pose(*moved), turns.T @ turns / variance)
+    return pose(*moved), turns.T @ turns / variance
