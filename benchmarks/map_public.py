@@ -115,7 +115,7 @@ def compare(public: Public, robust: bool) -> dict[str, Any]:
 def _believed(public: Public) -> Array:
     """Poses by our incremental graph, closure by closure, none of them doubted."""
     dense = public.dense
-    graph, poses = IncrementalGraph(dense.poses[0]), dense.poses[:1]
+    graph, poses = IncrementalGraph.begun(dense.poses[0]), dense.poses[:1]
     for k in tqdm(range(len(dense.closures)), desc=f"{public.name}, all believed"):
         closure = dense.closures.taken(slice(k, k + 1))
         steps = _until(dense, graph.count, int(max(closure.k1[0], closure.k2[0])))

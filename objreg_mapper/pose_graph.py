@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from objreg_mapper.constraint import Constraint, between_keyframes, floored
-from objreg_mapper.optimisation.pairwise import PairwiseConsistency
+from objreg_mapper.optimisation.doubts import Doubts
 from objreg_mapper.optimisation.problem import End, Problem, Solution, SolvedTrajectory, Tie
 from objreg_mapper.optimisation.solver import Solver
 from objreg_mapper.optimisation.strain import Strain, strain_of
@@ -64,7 +64,7 @@ class PoseGraph:
         self.sessions.begin()
         self._closures: list[Tie] = []
         self._withdrawn: set[int] = set()
-        self._solver, self._pairwise = Solver(), PairwiseConsistency()
+        self._solver, self._doubts = Solver(), Doubts()
         self._solution = Solution((), np.zeros(0, bool), np.zeros(0))
         self._T_map_odom: dict[int, Array] = {}  # by session, as far as they are solved
 
@@ -202,16 +202,8 @@ class PoseGraph:
             len(self._closures),
             frozenset(self._withdrawn),
             self.params,
-            self._inconsistent(),
+            self._doubts.of(self._closures, self.sessions, self.params) - self._withdrawn,
         )
-
-    def _inconsistent(self) -> frozenset[int]:
-        doubted = frozenset[int]()
-        if self.params.pairwise_consistency:
-            doubted |= self._pairwise.inconsistent(self._closures, self.sessions)
-        if self.params.trust == "odometry":
-            doubted |= self._pairwise.contradicted(self._closures, self.sessions, self.params.picture_sigmas)
-        return doubted - self._withdrawn
 
     def adopt(self, problem: Problem, solution: Solution) -> MapSummary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""

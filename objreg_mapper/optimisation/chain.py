@@ -9,42 +9,65 @@ moves a later keyframe by is shared among those before as least squares would: b
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from objreg_mapper.constraint import Constraint, rotation_vectors
 from objreg_mapper.optimisation.steady import Steady, corrected_steps
+from objreg_mapper.session import Session, stacked
 from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverses, rotation_from_vector, skew
 
 STRAIGHT_RAD = 0.06  # one sigma: what an error that is shared by first order may turn by
 
 
+@dataclass(frozen=True, slots=True)
 class Chain:
-    """``T_chain_body (n, 4, 4)`` of keyframes, with what is steadily wrong taken out, and the sums of their errors.
+    """``T_chain_body (n, 4, 4)`` of keyframes, with what is ``steady`` in odometry's error taken out.
 
-    The variances of a step are those of its position and its rotation, m^2 and rad^2 in every axis.
+    ``sums`` are those of the errors of its steps, whose variances are those of position and rotation, m^2 and rad^2 in
+    every axis.
     """
 
-    def __init__(self, T_odom_first: Array, steady: Steady) -> None:
-        self.steady, self.T_chain_body = steady, T_odom_first[None].copy()
-        self._sums: tuple[Array, ...] = np.zeros((1,)), np.zeros((1,)), np.zeros((1, 3)), np.zeros((1, 3, 3))
+    steady: Steady
+    T_chain_body: Array
+    sums: tuple[Array, ...]
+
+    @classmethod
+    def begun(cls, T_odom_first: Array, steady: Steady) -> Chain:
+        """The chain of one keyframe."""
+        sums = np.zeros((1,)), np.zeros((1,)), np.zeros((1, 3)), np.zeros((1, 3, 3))
+        return cls(steady, T_odom_first[None].copy(), sums)
+
+    @classmethod
+    def of(cls, session: Session, count: int, steady: Steady) -> Chain:
+        """The chain of the first keyframes of a session."""
+        return cls.begun(session.keyframes.poses[0], steady).grown(session, count)
 
     def __len__(self) -> int:
         return len(self.T_chain_body)
 
-    def extend(self, T_odom_body: Array, variances: Array) -> None:
-        """Add keyframes: poses (m + 1, 4, 4) of odometry, the newest that is here first, and variances (m, 2)."""
+    def grown(self, session: Session, count: int) -> Chain:
+        """With those of the first ``count`` keyframes of its session that are not there yet."""
+        begin = len(self)
+        if count <= begin:
+            return self
+        variances = np.array(session.variances[begin - 1 : count - 1]).reshape(-1, 2)
+        return self.extended(stacked(session.keyframes.poses[begin - 1 : count]), variances)
+
+    def extended(self, T_odom_body: Array, variances: Array) -> Chain:
+        """With more keyframes: poses (m + 1, 4, 4) of odometry, the newest that is here first, and variances (m, 2)."""
         poses = [self.T_chain_body[-1]]
         for step in corrected_steps(T_odom_body, self.steady):
             poses.append(poses[-1] @ step)
         new = np.array(poses[1:]).reshape(-1, 4, 4)
-        self.T_chain_body = np.concatenate([self.T_chain_body, new])
         a, b = variances.T
         p = new[:, :3, 3] - self.T_chain_body[0, :3, 3]
         parts = a, b, b[:, None] * p, b[:, None, None] * p[:, :, None] * p[:, None, :]
-        grown = zip(self._sums, parts, strict=True)
-        self._sums = tuple(np.concatenate([old, old[-1] + np.cumsum(part, axis=0)]) for old, part in grown)
+        grown = zip(self.sums, parts, strict=True)
+        sums = tuple(np.concatenate([old, old[-1] + np.cumsum(part, axis=0)]) for old, part in grown)
+        return Chain(self.steady, np.concatenate([self.T_chain_body, new]), sums)
 
     def between(self, k1: int, k2: int) -> Constraint:
         """What odometry says between two keyframes, the earlier one first."""
@@ -63,7 +86,7 @@ class Chain:
 
     def straight_until(self, k1: int) -> int:
         """The last keyframe until which odometry has not turned far enough to matter; the next one at least."""
-        return max(int(np.searchsorted(self._sums[1], self._sums[1][k1] + STRAIGHT_RAD**2, side="right")) - 1, k1 + 1)
+        return max(int(np.searchsorted(self.sums[1], self.sums[1][k1] + STRAIGHT_RAD**2, side="right")) - 1, k1 + 1)
 
     def spread(self, nodes: Sequence[int], T_map_body: Array, keyframes: Array | None = None) -> Array:
         """(m, 4, 4): keyframes in the map, all of them if None, from where it has those of ``nodes``, which increase.
@@ -101,7 +124,7 @@ class Chain:
 
         A step turns what follows about where it ends: ``t = sum(t_s + r_s x (p - p_s))``.
         """
-        a, b, bp, bpp = (total[k2] - total[k1] for total in self._sums)
+        a, b, bp, bpp = (total[k2] - total[k1] for total in self.sums)
         p = self.T_chain_body[k2, :3, 3] - self.T_chain_body[0, :3, 3]
         mixed = bp[:, :, None] * p[:, None, :]
         M = b[:, None, None] * p[:, :, None] * p[:, None, :] - mixed - mixed.transpose(0, 2, 1) + bpp

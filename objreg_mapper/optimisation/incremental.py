@@ -7,7 +7,6 @@ Kaess et al., "iSAM2: Incremental Smoothing and Mapping Using the Bayes Tree" (2
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from copy import copy
 from importlib import import_module
 from typing import Any
 
@@ -35,6 +34,65 @@ def load() -> Any:
         raise MissingError(INSTALL) from error
 
 
+class _Waiting:
+    """What waits for the next update: new factors and values, and GTSAM's numbers of factors that are gone."""
+
+    def __init__(self, gtsam: Any) -> None:
+        self.factors, self.values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+        self.gone: list[int] = []
+
+    def is_nothing(self) -> bool:
+        """Whether an update would change nothing: a node comes with an edge, at least."""
+        return not (self.factors.size() or self.gone)
+
+
+class _Tree:
+    """GTSAM's iSAM2, what waits for it, and in ``places`` its numbers of the edges that are there, by ours."""
+
+    def __init__(self, gtsam: Any, isam: Any, places: Sequence[int]) -> None:
+        self._gtsam, self.isam, self.places = gtsam, isam, list(places)
+        self.waiting = _Waiting(gtsam)
+
+    @classmethod
+    def begun(cls, poses: Array, edges: Sequence[Any], is_careful: bool) -> _Tree:
+        """Of nodes at poses and GTSAM's factors between them, None of an edge that is gone."""
+        gtsam = load()
+        new, noise = _Waiting(gtsam), gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
+        new.factors.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(poses[0]), noise))
+        here = [number for number, edge in enumerate(edges) if edge is not None]
+        for number in here:
+            new.factors.add(edges[number])
+        for k, T in enumerate(poses):
+            new.values.insert(k, gtsam.Pose3(T))
+        isam, places = gtsam.ISAM2(_params(gtsam, is_careful)), [-1] * len(edges)
+        for number, place in zip(here, _updated(isam, new)[1:], strict=True):
+            places[number] = place
+        return cls(gtsam, isam, places)
+
+    def copied(self) -> _Tree:
+        """The same once more. Nothing may wait."""
+        return _Tree(self._gtsam, self._gtsam.ISAM2(self.isam), self.places)
+
+    def take_in(self) -> None:
+        """Bring in what waits."""
+        if not self.waiting.is_nothing():
+            self.places += _updated(self.isam, self.waiting)
+            self.waiting = _Waiting(self._gtsam)
+
+
+def _updated(isam: Any, new: _Waiting) -> list[int]:
+    """GTSAM's numbers of the new factors, once they are in."""
+    return list(isam.update(new.factors, new.values, new.gone).getNewFactorsIndices())
+
+
+def _params(gtsam: Any, is_careful: bool) -> Any:
+    params = gtsam.ISAM2Params()
+    params.setRelinearizeThreshold(RELINEARISED)
+    params.relinearizeSkip = 1
+    params.setFactorization("QR" if is_careful else "CHOLESKY")
+    return params
+
+
 class IncrementalGraph:
     """Nodes by number from 0, of which the first is held at a pose; edges by the numbers that come back for them.
 
@@ -43,62 +101,30 @@ class IncrementalGraph:
     metres. RuntimeError where GTSAM finds no solution; the graph is of no use then.
     """
 
-    def __init__(self, T_map_first: Array) -> None:
+    def __init__(self, settled: Array, edges: Sequence[Any], tree: _Tree, is_careful: bool) -> None:
         self._gtsam = load()
-        self._is_careful = False
-        self._edges: list[Any] = []  # GTSAM's factors, by our numbers; None of one that is gone
-        self._places: list[int] = []  # GTSAM's numbers of them
-        self._settled = T_map_first[None]
-        self._begin()
+        self._settled, self._tree, self._is_careful = settled, tree, is_careful
+        self._edges = list(edges)  # GTSAM's factors, by our numbers; None of one that is gone
+
+    @classmethod
+    def begun(cls, T_map_first: Array) -> IncrementalGraph:
+        """The graph of one node."""
+        return cls(T_map_first[None], (), _Tree.begun(T_map_first[None], (), is_careful=False), is_careful=False)
 
     @property
     def count(self) -> int:
         """How many nodes there are."""
         return len(self._settled)
 
-    def _begin(self) -> None:
-        """All that is there, in a new iSAM2."""
-        gtsam = self._gtsam
-        self._isam = gtsam.ISAM2(self._params())
-        self._clear()
-        noise = gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
-        self._new_factors.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(self._settled[0]), noise))
-        here = [number for number, edge in enumerate(self._edges) if edge is not None]
-        for number in here:
-            self._new_factors.add(self._edges[number])
-        for k, T in enumerate(self._settled):
-            self._new_values.insert(k, gtsam.Pose3(T))
-        places = list(self._isam.update(self._new_factors, self._new_values).getNewFactorsIndices())
-        self._places = [-1] * len(self._edges)
-        for number, place in zip(here, places[1:], strict=True):
-            self._places[number] = place
-        self._clear()
-
-    def _clear(self) -> None:
-        """Nothing waits for the next update."""
-        self._new_factors, self._new_values = self._gtsam.NonlinearFactorGraph(), self._gtsam.Values()
-        self._gone: list[int] = []
-
-    def _params(self) -> Any:
-        params = self._gtsam.ISAM2Params()
-        params.setRelinearizeThreshold(RELINEARISED)
-        params.relinearizeSkip = 1
-        params.setFactorization("QR" if self._is_careful else "CHOLESKY")
-        return params
-
     def copied(self) -> IncrementalGraph:
         """The same once more, to try something on."""
         self._update()
-        other = copy(self)
-        other._isam = self._gtsam.ISAM2(self._isam)
-        other._edges, other._places = list(self._edges), list(self._places)
-        other._clear()
-        return other
+        return IncrementalGraph(self._settled, self._edges, self._tree.copied(), self._is_careful)
 
     def grow(self, poses: Array, edges: Edges, gone: Sequence[int] = ()) -> list[int]:
         """Add nodes at ``poses (n, 4, 4)``, by the next numbers, and the edges that tie them; take out those gone."""
         for k, T in enumerate(poses, self.count):
-            self._new_values.insert(k, self._gtsam.Pose3(T))
+            self._tree.waiting.values.insert(k, self._gtsam.Pose3(T))
         self._settled = np.concatenate([self._settled, poses])
         numbers = self.add(edges)
         self.remove(gone)
@@ -109,7 +135,7 @@ class IncrementalGraph:
         first = len(self._edges)
         for factor in self._factors(edges):
             self._edges.append(factor)
-            self._new_factors.add(factor)
+            self._tree.waiting.factors.add(factor)
         return list(range(first, len(self._edges)))
 
     def _factors(self, edges: Edges) -> Iterator[Any]:
@@ -120,10 +146,10 @@ class IncrementalGraph:
 
     def remove(self, numbers: Sequence[int]) -> None:
         """Take edges out."""
-        if any(number >= len(self._places) for number in numbers):
+        if any(number >= len(self._tree.places) for number in numbers):
             self._update()
         for number in numbers:
-            self._gone.append(self._places[number])
+            self._tree.waiting.gone.append(self._tree.places[number])
             self._edges[number] = None
 
     def settle(self) -> Array:
@@ -133,7 +159,7 @@ class IncrementalGraph:
             known, self._settled = self._settled, self.poses()
             if relinearised <= FEW * self.count or np.abs(self._settled - known).max() < RELINEARISED:
                 return self._settled
-            relinearised = self._carefully(lambda: self._isam.update().getVariablesRelinearized())
+            relinearised = self._carefully(lambda: self._tree.isam.update().getVariablesRelinearized())
         self._settled = self.poses()
         return self._settled
 
@@ -145,22 +171,16 @@ class IncrementalGraph:
             if self._is_careful:
                 raise
         self._is_careful = True
-        self._begin()
+        self._tree = _Tree.begun(self._settled, self._edges, is_careful=True)
         return work()
 
     def _update(self) -> None:
-        self._carefully(self._take_in)
-
-    def _take_in(self) -> None:
-        if self._new_factors.size() or self._gone:
-            result = self._isam.update(self._new_factors, self._new_values, self._gone)
-            self._places += list(result.getNewFactorsIndices())
-            self._clear()
+        self._carefully(lambda: self._tree.take_in())
 
     def poses(self) -> Array:
         """(n, 4, 4) of all nodes."""
         self._update()
-        rows = self._gtsam.utilities.extractPose3(self._isam.calculateEstimate())
+        rows = self._gtsam.utilities.extractPose3(self._tree.isam.calculateEstimate())
         T = np.tile(np.eye(4), (len(rows), 1, 1))
         T[:, :3, :3], T[:, :3, 3] = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:]
         return T
@@ -172,9 +192,9 @@ class IncrementalGraph:
         """
         self._update()
         ends = np.unique([edges.k1, edges.k2])
-        joint = self._carefully(lambda: self._isam.jointMarginalCovariance(ends.tolist()))
+        joint = self._carefully(lambda: self._tree.isam.jointMarginalCovariance(ends.tolist()))
         blocks = np.block([[joint.at(a, b) for b in ends] for a in ends])
-        point, columns = self._isam.getLinearizationPoint(), np.arange(6)
+        point, columns = self._tree.isam.getLinearizationPoint(), np.arange(6)
         J = np.zeros((6 * len(edges), 6 * len(ends)))
         for row, factor in enumerate(self._factors(edges)):
             sides = np.searchsorted(ends, factor.keys())

@@ -8,17 +8,14 @@ other. They agree where the cycle closes as well as their covariances and odomet
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from objreg_mapper.constraint import inverted, local_covariance, rotation_vectors
 from objreg_mapper.optimisation.chain import Chain
-from objreg_mapper.optimisation.steady import Steady
-from objreg_mapper.optimisation.strain import LIMIT as MOST_SIGMAS
-from objreg_mapper.optimisation.strain import misfits
-from objreg_mapper.session import Session, stacked
+from objreg_mapper.session import stacked
 from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverses, skew
 
@@ -58,44 +55,21 @@ class PairwiseConsistency:
     """Who agrees with whom among all closures of a map."""
 
     def __init__(self) -> None:
-        self._taken = self._judged = 0
-        self._contradicted: set[int] = set()
-        self._chains: dict[int, Chain] = {}
+        self._taken = 0
         self._agreements: dict[tuple[int, int], Agreement] = {}
 
-    def inconsistent(self, ties: Sequence[Tie], sessions: Sequence[Session]) -> frozenset[int]:
-        """The numbers of ties that are not among the most between their sessions of which each agrees with each."""
+    def inconsistent(self, ties: Sequence[Tie], chains: Mapping[int, Chain]) -> frozenset[int]:
+        """The numbers of ties that are not among the most between their sessions of which each agrees with each.
+
+        ``chains`` are those of their sessions.
+        """
         for number in range(self._taken, len(ties)):
             tie = in_order(ties[number])
             ends = tie.end1.session, tie.end2.session
-            chains = self._chain(ends[0], sessions), self._chain(ends[1], sessions)
-            self._agreements.setdefault(ends, Agreement()).add(number, tie, chains)
+            of_ends = chains[ends[0]], chains[ends[1]]
+            self._agreements.setdefault(ends, Agreement()).add(number, tie, of_ends)
         self._taken = len(ties)
         return frozenset(number for one in self._agreements.values() for number in one.outside())
-
-    def contradicted(
-        self, ties: Sequence[Tie], sessions: Sequence[Session], picture_sigmas: tuple[float, float]
-    ) -> frozenset[int]:
-        """The numbers of ties within a session that odometry alone contradicts, beyond the deviations of both."""
-        for number in range(self._judged, len(ties)):
-            (session, _), (other, _), *_ = tie = ties[number]
-            if session == other:
-                chain = self._chain(session, sessions)
-                if misfits([tie], chain, picture_sigmas)[2][0] > MOST_SIGMAS:
-                    self._contradicted.add(number)
-        self._judged = len(ties)
-        return frozenset(self._contradicted)
-
-    def _chain(self, number: int, sessions: Sequence[Session]) -> Chain:
-        session = sessions[number]
-        if number not in self._chains:
-            self._chains[number] = Chain(session.keyframes.poses[0], Steady())
-        chain, count = self._chains[number], len(session.keyframes)
-        begin = len(chain)
-        if count > begin:
-            variances = np.array(session.variances[begin - 1 : count - 1]).reshape(-1, 2)
-            chain.extend(stacked(session.keyframes.poses[begin - 1 : count]), variances)
-        return chain
 
 
 def in_order(tie: Tie) -> Tie:

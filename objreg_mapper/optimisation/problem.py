@@ -54,6 +54,11 @@ class Problem(NamedTuple):
         """The ties that do not come into the graph."""
         return self.withdrawn | self.inconsistent
 
+    @property
+    def limit(self) -> float:
+        """The squared residual from which on a closure is left out."""
+        return self.params.max_residual**2
+
     def solve(self) -> Solution:
         """The courses with which all that can be believed agrees best."""
         return self.solver.solve(self)

@@ -10,9 +10,9 @@ without one that was doubtful when it came.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,21 @@ class _State:
         return self.factors >= 0
 
 
+class Belief(NamedTuple):
+    """What a graph holds of its closures, and where it puts its nodes: enough to begin another graph of them.
+
+    ``apart`` is what each closure says to a graph that it is not in, ``expected (m,)`` what each was expected to cost
+    when it came. Of those that are ``withdrawn``, by number, none is ever ``kept (m,)``.
+    """
+
+    poses: Array
+    closures: Edges
+    apart: Edges
+    expected: Array
+    withdrawn: tuple[int, ...]
+    kept: Array
+
+
 class RobustGraph:
     """Nodes, steps of odometry between them, and closures of which some may be false.
 
@@ -57,8 +72,17 @@ class RobustGraph:
         self._step_factors = np.zeros(0, int)
         self._withdrawn: tuple[int, ...] = ()  # closures
         self._expected = np.zeros(0)  # what each closure was expected to cost when it came
-        graph = IncrementalGraph(T_map_first)
+        graph = IncrementalGraph.begun(T_map_first)
         self._state = _State(graph, np.zeros(0, int), graph.poses(), np.zeros(0), 0.0)
+
+    @classmethod
+    def believing(cls, belief: Belief, steps: Edges, limit: float) -> RobustGraph:
+        """A graph of the same nodes and closures with other steps; closures go in and out until none wants to."""
+        graph = cls(belief.poses[0], limit)
+        if len(belief.poses) > 1:
+            graph.grow(belief.poses[1:], steps)
+            graph.believe(belief)
+        return graph
 
     @property
     def poses(self) -> Array:
@@ -91,12 +115,23 @@ class RobustGraph:
         self.steps = self.steps.joined(steps)
         self._state = replace(self._state, poses=np.concatenate([self._state.poses, poses]))
 
-    def believe(self, other: RobustGraph) -> None:
+    def belief(self) -> Belief:
+        """What it holds now."""
+        return self._belief_of(self._state)
+
+    def belief_with(self, number: int) -> Belief:
+        """What it would hold with a closure in it that was left out, whatever it costs."""
+        return self._belief_of(self._changed(self._state, [number], []))
+
+    def _belief_of(self, state: _State) -> Belief:
+        return Belief(state.poses, self.closures, self._apart, self._expected, self._withdrawn, state.kept)
+
+    def believe(self, belief: Belief) -> None:
         """Take in the closures of another graph of these nodes, as it does; then those go in and out that want to."""
-        self.closures, self._apart = other.closures, other._apart
-        self._expected, self._withdrawn = other._expected, other._withdrawn
-        graph, factors = self._state.graph, np.full(len(other.closures), -1)
-        factors[other.kept] = graph.add(other.closures.taken(other.kept))
+        self.closures, self._apart = belief.closures, belief.apart
+        self._expected, self._withdrawn = belief.expected, belief.withdrawn
+        graph, factors = self._state.graph, np.full(len(belief.closures), -1)
+        factors[belief.kept] = graph.add(belief.closures.taken(belief.kept))
         self._state = self._sorted_out(self._weighed(graph, factors))
 
     def close(self, closure: Edges, apart: Edges | None = None) -> None:
@@ -136,12 +171,6 @@ class RobustGraph:
     def left_out(self) -> list[int]:
         """The numbers of closures that are not believed and may be."""
         return np.setdiff1d(np.flatnonzero(~self.kept), self._withdrawn).tolist()
-
-    def forced(self, number: int) -> RobustGraph:
-        """The same with a closure in it that was left out, whatever it costs."""
-        other = copy(self)
-        other._state = self._changed(self._state, [number], [])
-        return other
 
     def withdraw(self, number: int) -> None:
         """A closure is left out from now on, whatever it costs."""

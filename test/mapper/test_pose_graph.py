@@ -286,8 +286,7 @@ def test_between_keyframes_the_correction_goes_over_from_the_one_to_the_other() 
     for word in odometry([pose(np.eye(3), np.array([0.25 * k, 0.0, 0.0])) for k in range(9)]):
         graph.add_odometry(word)
     aside = np.array([pose(np.eye(3), np.array([x, y, 0.0])) for x, y in ((0.0, 0.0), (1.0, 0.1), (2.0, 0.4))])
-    chain = Chain(np.eye(4), Steady())
-    chain.extend(np.array(graph.keyframes.poses), np.full((2, 2), 1e-4))
+    chain = Chain.begun(np.eye(4), Steady()).extended(np.array(graph.keyframes.poses), np.full((2, 2), 1e-4))
     course = SolvedTrajectory(chain, (0, 1, 2), aside)
     graph.adopt(graph.problem(), Solution((course,), np.zeros(0, bool), np.zeros(0)))
     found = [T[:2, 3] for T in graph.corrected(o.stamp_ns for o in odometry([np.eye(4)] * 9))]

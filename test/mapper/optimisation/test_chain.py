@@ -33,8 +33,7 @@ ODOM = winding()
 
 
 def chain(steady: Steady = Steady(), variances: Array = VARIANCES) -> Chain:
-    made = Chain(ODOM[0], steady)
-    made.extend(ODOM, variances)
+    made = Chain.begun(ODOM[0], steady).extended(ODOM, variances)
     return made
 
 
@@ -76,9 +75,9 @@ def test_the_covariance_is_how_sampled_ways_differ() -> None:
 
 
 def test_a_chain_that_grows_bit_by_bit_is_the_same() -> None:
-    whole, grown = chain(), Chain(ODOM[0], Steady())
+    whole, grown = chain(), Chain.begun(ODOM[0], Steady())
     for begin, end in ((0, 1), (1, 1), (1, 9), (9, COUNT - 1)):
-        grown.extend(ODOM[begin : end + 1], VARIANCES[begin:end])
+        grown = grown.extended(ODOM[begin : end + 1], VARIANCES[begin:end])
     np.testing.assert_allclose(grown.T_chain_body, whole.T_chain_body, atol=1e-12)
     np.testing.assert_allclose(grown.between(2, 13).covariance, whole.between(2, 13).covariance, rtol=1e-9, atol=1e-17)
 
@@ -86,8 +85,7 @@ def test_a_chain_that_grows_bit_by_bit_is_the_same() -> None:
 def test_what_is_steadily_wrong_is_taken_out() -> None:
     straight = np.tile(np.eye(4), (5, 1, 1))
     straight[:, 0, 3] = np.arange(5)
-    made = Chain(straight[0], Steady(along=0.1))
-    made.extend(straight, np.full((4, 2), 1e-6))
+    made = Chain.begun(straight[0], Steady(along=0.1)).extended(straight, np.full((4, 2), 1e-6))
     np.testing.assert_allclose(made.T_chain_body[:, 0, 3], 1.1 * np.arange(5), atol=1e-12)
 
 

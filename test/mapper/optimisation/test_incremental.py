@@ -26,7 +26,7 @@ def edge(k1: int, k2: int, T: Array, sigma: float = 0.1) -> Edges:
 
 def row(count: int = 6) -> IncrementalGraph:
     """Nodes a metre apart, as the steps between them say."""
-    graph = IncrementalGraph(np.eye(4))
+    graph = IncrementalGraph.begun(np.eye(4))
     steps = edges_of([(k, k + 1, Constraint(translation(1.0), 0.01 * np.eye(6))) for k in range(count - 1)])
     graph.grow(np.array([translation(float(k)) for k in range(1, count)]), steps)
     return graph
@@ -48,7 +48,7 @@ def test_two_measurements_meet_where_their_information_says() -> None:
         return whitened_errors(np.array([np.eye(4), there(x)]), edges).ravel()
 
     expected = there(least_squares(residuals, np.zeros(6), xtol=1e-14).x)
-    graph = IncrementalGraph(np.eye(4))
+    graph = IncrementalGraph.begun(np.eye(4))
     graph.grow(T_first[None], edges)
     graph.settle()
     np.testing.assert_allclose(graph.poses()[1], expected, atol=1e-4)
@@ -56,7 +56,7 @@ def test_two_measurements_meet_where_their_information_says() -> None:
 
 def test_the_first_node_stays() -> None:
     start = translation(3.0, 4.0)
-    graph = IncrementalGraph(start)
+    graph = IncrementalGraph.begun(start)
     graph.grow(np.eye(4)[None], edge(0, 1, translation(1.0)))
     graph.settle()
     np.testing.assert_allclose(graph.poses(), [start, translation(4.0, 4.0)], atol=1e-6)
@@ -85,7 +85,7 @@ def test_numbers_tell_edges_apart_whether_they_were_solved_or_still_wait() -> No
 
 
 def test_a_step_gives_way_to_two_with_a_node_between() -> None:
-    graph = IncrementalGraph(np.eye(4))
+    graph = IncrementalGraph.begun(np.eye(4))
     whole = graph.grow(translation(2.0)[None], edge(0, 1, translation(2.0)))
     halves = edge(0, 2, translation(1.0)).joined(edge(2, 1, translation(1.0)))
     graph.grow(translation(1.0)[None], halves, whole)

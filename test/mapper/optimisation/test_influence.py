@@ -29,7 +29,7 @@ def joined(closures: list[Edges]) -> Edges:
 
 
 def solved(closures: list[Edges]) -> tuple[IncrementalGraph, Array]:
-    graph = IncrementalGraph(np.eye(4))
+    graph = IncrementalGraph.begun(np.eye(4))
     places = np.array([pose(np.eye(3), np.array([float(k), 0.0, 0.0])) for k in range(1, COUNT)])
     graph.grow(places, joined([edge(k, k + 1, sigma=0.1) for k in range(COUNT - 1)]))
     graph.add(joined(closures))

@@ -26,8 +26,7 @@ TRUE = [pose(np.linalg.matrix_power(TURN, k), np.array([np.cos(0.2 * k), np.sin(
 
 
 def chain() -> Chain:
-    made = Chain(TRUE[0], Steady())
-    made.extend(np.array(TRUE), np.full((COUNT - 1, 2), 1e-5))
+    made = Chain.begun(TRUE[0], Steady()).extended(np.array(TRUE), np.full((COUNT - 1, 2), 1e-5))
     return made
 
 
@@ -63,8 +62,7 @@ def test_two_that_are_true_agree_and_one_that_is_aside_does_not() -> None:
 
 
 def test_odometry_that_wanders_far_lets_more_agree() -> None:
-    loose = Chain(TRUE[0], Steady())
-    loose.extend(np.array(TRUE), np.full((COUNT - 1, 2), 1e-2))
+    loose = Chain.begun(TRUE[0], Steady()).extended(np.array(TRUE), np.full((COUNT - 1, 2), 1e-2))
     assert agrees(tie(0, 20), tie(5, 25, aside=0.3), (loose, loose))
 
 
@@ -116,17 +114,17 @@ def test_none_agree_of_none() -> None:
 
 
 def test_lies_are_outside_and_come_in_when_more_speak_for_them() -> None:
-    sessions, known = [session()], PairwiseConsistency()
+    chains, known = {0: Chain.of(session(), COUNT, Steady())}, PairwiseConsistency()
     told = [tie(0, 20), tie(1, 21, aside=1.0), tie(2, 22)]
-    assert known.inconsistent(told, sessions) == {1}
+    assert known.inconsistent(told, chains) == {1}
     told += [tie(k, 20 + k, aside=1.0) for k in (3, 4, 5)]
-    assert known.inconsistent(told, sessions) == {0, 2}
+    assert known.inconsistent(told, chains) == {0, 2}
 
 
 def test_closures_between_other_sessions_say_nothing_of_these() -> None:
-    sessions = [session(), session()]
+    chains = dict.fromkeys((0, 1), Chain.of(session(), COUNT, Steady()))
     told = [tie(0, 20), tie(2, 22), tie(3, 9, aside=1.0, sessions=(1, 0)), tie(4, 10, aside=1.0, sessions=(1, 0))]
-    assert PairwiseConsistency().inconsistent(told, sessions) == frozenset()
+    assert PairwiseConsistency().inconsistent(told, chains) == frozenset()
 
 
 def test_a_map_with_it_leaves_out_lies_and_is_as_one_without_where_there_are_none() -> None:

@@ -178,7 +178,7 @@ def test_another_graph_of_the_nodes_believes_the_same() -> None:
     said = [*(right(*ends) for ends in RIGHT), lie(0, 10, 0.5), lie(2, 9, 0.01)]
     graph, other = closed(said), row()
     graph.withdraw(6)
-    other.believe(graph)
+    other.believe(graph.belief())
     assert other.kept.tolist() == graph.kept.tolist() and apart(graph, other) < 2e-3
     other.close(right(3, 10))
     assert other.kept.tolist() == [*graph.kept.tolist(), True]

@@ -14,6 +14,7 @@ from mapper.bent import bent, closure, distances, odometry, square
 from objreg_mapper.constraint import Constraint
 from objreg_mapper.optimisation.edges import Edges
 from objreg_mapper.optimisation.incremental import IncrementalGraph
+from objreg_mapper.optimisation.keyframe_graph import KeyframeGraph
 from objreg_mapper.optimisation.problem import End, Problem, Solution, Tie
 from objreg_mapper.optimisation.solver import Solver
 from objreg_mapper.optimisation.steady import Steady
@@ -235,10 +236,10 @@ def test_a_closure_on_which_gtsam_raises_is_left_out(name: str, monkeypatch: pyt
 
 
 def test_what_is_no_closure_s_fault_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(_: Solver, __: Problem) -> None:
+    def fail(_: KeyframeGraph, __: Problem) -> None:
         raise RuntimeError("no solution")
 
-    monkeypatch.setattr(Solver, "_calibrate", fail)
+    monkeypatch.setattr(KeyframeGraph, "calibrate", fail)
     with pytest.raises(RuntimeError, match="no solution"):
         solved([ONE], RIGHT)
 
