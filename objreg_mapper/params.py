@@ -12,7 +12,7 @@ from objreg_ros.params import MountedParams, Params, param, require_namespaces
 
 GONE = dict.fromkeys(
     ("min_sigma_translation", "min_sigma_rotation"),
-    "it is LEAST_SIGMAS in mapper/pose_graph.py; what constraints share is picture_*_error",
+    "it is LEAST_SIGMAS in objreg_mapper/closure_constraint.py; what constraints share is picture_*_error",
 )
 
 # How our own tracking errs after one metre or one radian, one sigma, in m and degrees: over 1 to 20 frames by 0.033 to

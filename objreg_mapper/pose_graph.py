@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_mapper.constraint import Constraint, between_keyframes, floored
+from objreg_mapper.closure_constraint import Mounting, constraint_of
+from objreg_mapper.constraint import Constraint
 from objreg_mapper.optimisation.doubts import Doubts
 from objreg_mapper.optimisation.problem import End, Problem, Solution, SolvedTrajectory, Tie
 from objreg_mapper.optimisation.solver import Solver
@@ -23,11 +24,6 @@ from objreg_ros.data.closures import LoopClosure, may_be_same
 from objreg_ros.data.frames import Odometry
 from objreg_ros.geometry import inverse, is_rigid
 
-LEAST_SIGMAS = 1e-3, float(np.radians(0.025))  # m and rad: no constraint is believed to know better, whatever it claims
-SLACK_M = 1.0  # that a closure may lead farther than any path: odometry at rest trembles, and is not the camera
-Mounting = Callable[[str, str], Array | None]  # T_body_camera of a robot and a camera's frame; None: they are one
-VAGUEST = 1e12  # m^2 and rad^2: ROS says "unknown" by less; what is known no better adds nothing
-
 
 @dataclass(frozen=True, slots=True)
 class MapSummary:
@@ -40,10 +36,6 @@ class MapSummary:
     pruned: tuple[LoopClosure, ...] = ()
     residuals: tuple[float, ...] = ()
     strain: Strain = Strain()
-
-
-class ImplausibleError(ValueError):
-    """A closure claims what cannot be: a path that no body took, or a pose of which nothing is known."""
 
 
 class UnknownRobotError(ValueError):
@@ -109,7 +101,8 @@ class PoseGraph:
             return False
         ends = End(one, self._nearest(one, closure.from_ns)), End(other, self._nearest(other, closure.to_ns))
         if ends[0] != ends[1]:
-            self._tie(closure, ends, T_body_camera)
+            constraint = constraint_of(closure, ends, self.sessions, T_body_camera, self.params)
+            self._closures.append(Tie(*ends, constraint, closure))
         self.sessions.learn(one, closure.from_session)
         self.sessions.learn(other, closure.to_session)
         return True
@@ -141,40 +134,6 @@ class PoseGraph:
 
     def _nearest(self, session: int, stamp_ns: int) -> int:
         return self.sessions[session].keyframes.nearest(stamp_ns)
-
-    def _tie(self, closure: LoopClosure, ends: tuple[End, End], T_body_camera: Array | Mounting | None) -> None:
-        one, other = (self.sessions[end.session] for end in ends)
-        mounts = (
-            _mounted(T_body_camera, one.robot, closure.from_frame_id),
-            _mounted(T_body_camera, other.robot, closure.to_frame_id),
-        )
-        stamps_ns = one.keyframes.stamps_ns[ends[0].keyframe], other.keyframes.stamps_ns[ends[1].keyframe]
-        odometry = one.odometry, other.odometry
-        with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
-            constraint = between_keyframes(closure, odometry, stamps_ns, mounts, self.params.odometry_sigmas)
-        self._refuse_implausible(ends, constraint)
-        covariance = floored(constraint.covariance, LEAST_SIGMAS)
-        self._closures.append(Tie(*ends, constraint._replace(covariance=covariance), closure))
-
-    def _refuse_implausible(self, ends: tuple[End, End], constraint: Constraint) -> None:
-        known = np.abs(constraint.covariance).max()
-        if not known <= VAGUEST:
-            raise ImplausibleError(f"expected variances of at most {VAGUEST:g} m^2 and rad^2, got {known:g}")
-        (most, path), metres = self._farthest(ends), np.linalg.norm(constraint.T_from_to[:3, 3])
-        if not metres <= most:
-            raise ImplausibleError(
-                f"expected a constraint over at most {most:.2f} m, as odometry went {path:.2f} m meanwhile, "
-                f"got {metres:.4g} m"
-            )
-
-    def _farthest(self, ends: tuple[End, End]) -> tuple[float, float]:
-        """How far the second end may be from the first, and how far odometry went between them, m."""
-        (s1, k1), (s2, k2) = ends
-        if s1 != s2:
-            return VAGUEST, np.inf
-        session = self.sessions[s1]
-        path = session.path_m(k1, k2)
-        return SLACK_M + self.params.max_stretch * path + self.params.max_speed * session.silent_s(k1, k2), path
 
     def in_gap(self, closure: LoopClosure) -> bool:
         """Whether a stamp of the closure lies in a gap of the newest odometry."""
@@ -353,12 +312,6 @@ class PoseGraph:
         solved = trajectory.of()
         T_map_odom = solved[-1] @ inverse(odom[len(solved) - 1])
         return np.concatenate([solved, T_map_odom @ odom[len(solved) :]])
-
-
-def _mounted(mounting: Array | Mounting | None, robot: str, frame_id: str) -> Array:
-    """``T_body_camera`` of a camera on a robot."""
-    T = mounting(robot, frame_id) if callable(mounting) else mounting
-    return np.eye(4) if T is None else T
 
 
 def _corrected_at(stamp_ns: int, session: Session, mapped: Array) -> Array:

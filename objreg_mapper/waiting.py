@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
+from objreg_mapper.closure_constraint import ImplausibleError
 from objreg_mapper.follower import Followers
-from objreg_mapper.pose_graph import ImplausibleError, PoseGraph, UnknownRobotError
+from objreg_mapper.pose_graph import PoseGraph, UnknownRobotError
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import Odometry

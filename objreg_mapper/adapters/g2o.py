@@ -16,10 +16,11 @@ from objreg_mapper.adapters.body import Body
 from objreg_mapper.adapters.diagnostics import G2oDiagnostics
 from objreg_mapper.adapters.odometry_in import OdometryIn
 from objreg_mapper.adapters.params import BodyParams, ToG2oParams
+from objreg_mapper.closure_constraint import ImplausibleError
 from objreg_mapper.formats.g2o import graph_text
 from objreg_mapper.map_files import graph_file, require_ours
 from objreg_mapper.params import MapperParams
-from objreg_mapper.pose_graph import ImplausibleError, PoseGraph
+from objreg_mapper.pose_graph import PoseGraph
 from objreg_mapper.restart import Anew
 from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.spin import run

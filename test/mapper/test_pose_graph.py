@@ -9,13 +9,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from objreg_mapper.closure_constraint import ImplausibleError
 from objreg_mapper.optimisation.chain import Chain
 from objreg_mapper.optimisation.edges import Edges
 from objreg_mapper.optimisation.incremental import IncrementalGraph
 from objreg_mapper.optimisation.problem import Solution, SolvedTrajectory
 from objreg_mapper.optimisation.steady import Steady
 from objreg_mapper.params import MapperParams
-from objreg_mapper.pose_graph import ImplausibleError, PoseGraph
+from objreg_mapper.pose_graph import PoseGraph
 from objreg_mapper.sparse import TOLERANCE_DEG, TOLERANCE_M
 from objreg_mapper.trajectory import Trajectory
 from objreg_ros.data.checked import Array

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+from objreg_mapper.closure_constraint import ImplausibleError
 from objreg_mapper.params import MapperParams
-from objreg_mapper.pose_graph import ImplausibleError, PoseGraph
+from objreg_mapper.pose_graph import PoseGraph
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import Odometry
