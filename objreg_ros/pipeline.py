@@ -97,7 +97,10 @@ class Pipeline:
         self._segmenter, self._inputs, self._host = segmenter, inputs, host
 
     def segment(self, match: Match, cameras: colour_frame.Cameras, raw: lenses.Raw) -> Segmented:
-        """The frame of the messages of one time; what ``host.read`` raises where one of them breaks its contract."""
+        """The frame of the messages of one time; what ``host.read`` raises where one of them breaks its contract.
+
+        ValueError where a cloud is no surface that a camera sees, or lacks the camera that it needs.
+        """
         seen, detections = self._seen(match, cameras, raw)
         gravity, sigma_deg = self._gravity(match, seen.depth.frame_id)
         with self._host.timed("segment"):
@@ -122,7 +125,7 @@ class Pipeline:
             "camera_info", camera_from_msg.camera_of_cloud, cameras.depth, cloud, self._host.most_pixels
         )
         with self._host.timed("organise"):
-            depth = self._read("points", organise, cloud, camera)
+            depth = organise(cloud, camera)
         seen = colour_frame.SeenFrame(depth, cameras.depth, raw)
         return seen, self._boxes(match, seen, None, cloud)
 

@@ -640,4 +640,4 @@ def test_a_cloud_of_a_body_is_turned_into_the_frame_of_the_picture() -> None:
     assert run.frames == 2 and not run.dropped
     np.testing.assert_allclose(chain.frames[0].view.xyz, xyz, atol=1e-5)
     run = run_offline(said, stages, inputs)
-    assert run.frames == 0 and "publish /tf_static between its frame" in run.complaints["malformed_points"]
+    assert run.frames == 0 and "publish /tf_static between its frame" in run.complaints["refused"]

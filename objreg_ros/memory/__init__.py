@@ -5,5 +5,5 @@ The `store` is one SQLite file: a `store_file` under a `claim`, keyframes as row
 `checksum`, written and deleted by a `transaction` that counts them in the `counters`; those of 0.2.0 are brought here
 by `migration`. A `sighting` is one object of one keyframe, `landmarks` are objects over all of them, of which each is
 `known` by numbers. `retrieval` of what may be here again goes by the `nearest_neighbours` of a `descriptor`. `compact`
-makes a keyframe few bytes, to be sent. `params` has the parameters.
+makes a keyframe few bytes, to be sent in an `envelope`. `params` has the parameters.
 """

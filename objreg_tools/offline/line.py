@@ -203,8 +203,8 @@ class Line:
                 continue
             try:
                 made = self._pipeline.segment(match, self._cameras, self._raw)
-            except _MalformedError as error:
-                self._drop(error.topic, str(error))
+            except (_MalformedError, ValueError) as error:
+                self._drop(f"malformed_{error.topic}" if isinstance(error, _MalformedError) else "refused", str(error))
             else:
                 self._pass_on(made)
 
@@ -261,12 +261,12 @@ class Line:
         try:
             return work()
         except ValueError as error:
-            self._drop(name, str(error))
+            self._drop(f"malformed_{name}", str(error))
             return None
 
-    def _drop(self, name: str, why: str) -> None:
-        self.run.dropped[f"malformed_{name}"] += 1
-        self.run.complaints.setdefault(f"malformed_{name}", why)
+    def _drop(self, reason: str, why: str) -> None:
+        self.run.dropped[reason] += 1
+        self.run.complaints.setdefault(reason, why)
 
     @contextmanager
     def _timed(self, stage: str) -> Iterator[None]:
