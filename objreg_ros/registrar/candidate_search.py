@@ -149,4 +149,4 @@ class Search:
         method.prepare(keyframe)
         prior = expect(keyframe, target, self._params)
         registered = pool.submit(align, keyframe, target, prior, self._params, method, gate)
-        return lambda: self._means.confirmation.receive(keyframe, target, prior, registered.result())
+        return lambda: self._means.confirmation.decide(keyframe, target, prior, registered.result())

@@ -50,7 +50,7 @@ class Confirmation:
         """How many wait."""
         return len(self._waiting)
 
-    def receive(
+    def decide(
         self, source: Keyframe, target: Keyframe, prior: Prior | None, registration: Registration
     ) -> Decision | Rejected:
         """What the registration of a pair comes to beside what was received before.

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import Reason, Relocalised
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected, Relocalised
 from objreg_ros.data.frames import Frame
 from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
@@ -25,7 +25,7 @@ from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks
 from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, Search
-from objreg_ros.registrar.closure import observations, rejected
+from objreg_ros.registrar.closure import Decision, observations, rejected
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
 from objreg_ros.registrar.params import RegistrarParams
@@ -146,7 +146,7 @@ class Registrar:
             if window.doubt:
                 return self._tracks.refuse(window, window.doubt)
             keyframe = fuse(window, self.params)
-            return self._search(keyframe, window.clock, budget, window.proven) if keyframe.objects else Outcome()
+            return self._close_loops(keyframe, window.clock, budget, window.proven) if keyframe.objects else Outcome()
 
     def receive(
         self, arrival: Arrival, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
@@ -157,31 +157,21 @@ class Registrar:
         budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
             self.params = self._recollection.params = self._adopted
-            return None if (received := self._origins.received(arrival)) is None else self._search(*received, budget)
+            received = self._origins.received(arrival)
+            return None if received is None else self._close_loops(*received, budget)
 
-    def _search(self, made: Keyframe, clock: Clock, budget: Budget, proven: bool = True) -> Outcome:
+    def _close_loops(self, made: Keyframe, clock: Clock, budget: Budget, proven: bool = True) -> Outcome:
+        """The five steps of a keyframe: track, retrieve, register, judge, remember."""
         keyframe, track = made.numbered(self._store.next_keyframe()), self._tracks.of(made.camera)
-        track.proven = proven
-        self._session = keyframe.session
-        before = self._tracks.go_on(keyframe, clock, self._recollection)
+        given_up = self._follow(keyframe, clock, track, proven)
         sightings = sightings_of(keyframe)
-        found = self._find_closures(keyframe, sightings, track, budget)
-        believed = found.accepted if proven else []
-        try:
-            closures, named = self._recollection.remember(keyframe, sightings, believed)
-        except StoreError:
-            for item in found.accepted:
-                track.thinning.withdraw(item.target.session, item.target.stamp_ns, keyframe.stamp_ns)
-            raise
-        for item, closure in zip(believed, closures, strict=True):
-            track.relocalisation.receive(closure, keyframe, item.target)
-        if not proven:
-            track.wait_for_proof(found.accepted, keyframe, named)
-        for decision in found.waiting:
-            track.hold(decision, keyframe, named)
+        candidates = self._recollection.index.query(sightings, track.hidden)
+        found = self._register(candidates, keyframe, track, budget) if candidates else self._none_alike(keyframe)
+        believed = found.accepted if track.proven else []
+        closures, named = self._remember(keyframe, sightings, believed, found, track)
         outcome = Outcome(
             closures=closures,
-            rejected=(*before, *found.refused),
+            rejected=(*given_up, *found.refused),
             keyframe_ns=keyframe.stamp_ns,
             keyframe_id=keyframe.keyframe_id,
             observations=observations(keyframe, named),
@@ -190,6 +180,49 @@ class Registrar:
             robot=keyframe.robot,
         )
         return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
+
+    def _follow(self, keyframe: Keyframe, clock: Clock, track: CameraTrack, proven: bool) -> tuple[Rejected, ...]:
+        """Go on to the keyframe; what is given up where the clock of its camera began anew."""
+        track.proven, self._session = proven, keyframe.session
+        return self._tracks.go_on(keyframe, clock, self._recollection)
+
+    def _register(
+        self, candidates: Sequence[CandidateKeyframe], keyframe: Keyframe, track: CameraTrack, budget: Budget
+    ) -> Found:
+        """Register the keyframe with each candidate, and judge each pair by the gate and by what others say of it.
+
+        Both in one pass: no more pairs are registered once enough are accepted.
+        """
+        gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
+        means = Means(self._store, self._method, gate, track.confirmation, pool)
+        return Search(keyframe, track.thinning, budget, means, self.params).run(candidates)
+
+    def _none_alike(self, keyframe: Keyframe) -> Found:
+        detail = f"none of {len(self._recollection.index)} stored objects is alike and may be here"
+        return Found([], [], [rejected(keyframe.stamp_ns, keyframe, (Reason.NO_CANDIDATE, detail), keyframe)])
+
+    def _remember(
+        self,
+        keyframe: Keyframe,
+        sightings: Sequence[Sighting],
+        believed: Sequence[Decision],
+        found: Found,
+        track: CameraTrack,
+    ) -> tuple[tuple[LoopClosure, ...], tuple[Sighting, ...]]:
+        """Store the keyframe with what is believed of it, and keep what waits; the closures, and its landmarks."""
+        try:
+            closures, named = self._recollection.remember(keyframe, sightings, believed)
+        except StoreError:
+            for decision in found.accepted:
+                track.thinning.withdraw(decision.target.session, decision.target.stamp_ns, keyframe.stamp_ns)
+            raise
+        for decision, closure in zip(believed, closures, strict=True):
+            track.relocalisation.receive(closure, keyframe, decision.target)
+        if not track.proven:
+            track.wait_for_proof(found.accepted, keyframe, named)
+        for decision in found.waiting:
+            track.hold(decision, keyframe, named)
+        return closures, named
 
     def moment(self, keyframe_id: int) -> tuple[Keyframe, Clock]:
         """A stored keyframe, and the run of its camera's clock that goes on. KeyError where it is not stored, or no
@@ -244,7 +277,7 @@ class Registrar:
             first, before = track.clock is None, self._tracks.go_on(keyframe, clock, self._recollection)
             if first:
                 track.thinning.recall(self._recollection.ties_of(keyframe.camera))
-            found = self._try([one for one in candidates if one.keyframe_id in stored], keyframe, track, budget)
+            found = self._register([one for one in candidates if one.keyframe_id in stored], keyframe, track, budget)
             closures = self._recollection.remember_closures(keyframe, found.accepted)
             for decision in found.waiting:
                 track.hold(decision, keyframe, self._recollection.as_known(keyframe, decision))
@@ -280,20 +313,3 @@ class Registrar:
         with self._lock:
             self._pools.shutdown()
             self._store.close()
-
-    def _find_closures(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], track: CameraTrack, budget: Budget
-    ) -> Found:
-        """What the stored keyframes that may show the same place come to; a refusal where none may."""
-        candidates = self._recollection.index.query(sightings, track.hidden)
-        if not candidates:
-            detail = f"none of {len(self._recollection.index)} stored objects is alike and may be here"
-            return Found([], [], [rejected(keyframe.stamp_ns, keyframe, (Reason.NO_CANDIDATE, detail), keyframe)])
-        return self._try(candidates, keyframe, track, budget)
-
-    def _try(
-        self, candidates: Sequence[CandidateKeyframe], keyframe: Keyframe, track: CameraTrack, budget: Budget
-    ) -> Found:
-        gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
-        means = Means(self._store, self._method, gate, track.confirmation, pool)
-        return Search(keyframe, track.thinning, budget, means, self.params).run(candidates)

@@ -68,18 +68,18 @@ def hold(confirmation: Confirmation, one: Pair, held: Decision | Rejected) -> Wa
 
 def test_an_accepted_pose_is_of_the_stored_keyframe_and_does_not_wait() -> None:
     one = tried(0.0)
-    verdict = Confirmation(PARAMS).receive(*one)
+    verdict = Confirmation(PARAMS).decide(*one)
     assert isinstance(verdict, Decision) and verdict.accepted
     assert verdict.target is one.target and verdict.candidate is one.registration.candidate
 
 
 def test_a_doubtful_pose_waits_until_three_sure_ones_agree_and_keeps_its_own_stamps() -> None:
     confirmation, first = Confirmation(PARAMS), tried(0.0, **DOUBTFUL)
-    hold(confirmation, first, confirmation.receive(*first))
+    hold(confirmation, first, confirmation.decide(*first))
     for at_m in (0.1, 0.2):
-        confirmation.receive(*tried(at_m))
+        confirmation.decide(*tried(at_m))
     assert confirmation.settle(first.source.stamp_ns) == ([], []) and len(confirmation) == 1
-    confirmation.receive(*tried(0.4))
+    confirmation.decide(*tried(0.4))
     (late,), refused = confirmation.settle(first.source.stamp_ns)
     assert refused == [] and len(confirmation) == 0
     assert (late.closure.from_ns, late.closure.to_ns) == (first.target.stamp_ns, first.source.stamp_ns)
@@ -89,8 +89,8 @@ def test_a_doubtful_pose_waits_until_three_sure_ones_agree_and_keeps_its_own_sta
 def test_a_doubtful_pose_that_others_confirmed_before_does_not_wait() -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2, 0.3):
-        confirmation.receive(*tried(at_m))
-    verdict = confirmation.receive(*tried(0.4, **DOUBTFUL))
+        confirmation.decide(*tried(at_m))
+    verdict = confirmation.decide(*tried(0.4, **DOUBTFUL))
     assert (
         isinstance(verdict, Decision)
         and verdict.accepted
@@ -101,9 +101,9 @@ def test_a_doubtful_pose_that_others_confirmed_before_does_not_wait() -> None:
 
 def test_a_doubtful_pose_that_slides_is_refused_in_the_end_with_the_gate_s_reason() -> None:
     confirmation, slid = Confirmation(PARAMS), tried(0.1, ASIDE, **DOUBTFUL)
-    waiting = hold(confirmation, slid, confirmation.receive(*slid))
+    waiting = hold(confirmation, slid, confirmation.decide(*slid))
     for at_m in (0.2, 0.4, 0.6):
-        confirmation.receive(*tried(at_m))
+        confirmation.decide(*tried(at_m))
     assert confirmation.settle(slid.source.stamp_ns + 10 * 10**9) == ([], [])
     accepted, (refused,) = confirmation.settle(slid.source.stamp_ns + 10 * 10**9 + 1)
     assert accepted == [] and (refused.reason, refused.detail) == waiting.refusal
@@ -114,10 +114,10 @@ def test_a_doubtful_pose_that_slides_is_refused_in_the_end_with_the_gate_s_reaso
 def test_an_accepted_pose_that_its_neighbours_contradict_is_not_published() -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2, 0.4):
-        confirmation.receive(*tried(at_m))
+        confirmation.decide(*tried(at_m))
     false = tried(0.6, ASIDE)
     assert false.registration.accepted
-    hold(confirmation, false, confirmation.receive(*false))
+    hold(confirmation, false, confirmation.decide(*false))
     confirmed, (refused,) = confirmation.settle(None)
     assert confirmed == [] and refused.reason is Reason.NEIGHBOURS and "0.00 < 0.5" in refused.detail
 
@@ -127,26 +127,26 @@ def test_an_accepted_pose_that_jitter_excuses_is_published_and_a_moved_one_is_no
         confirmation = Confirmation(PARAMS)
         confirmation._consistency = passes(Jitter(3.0, 0.04))
         for at_m in (10.0, 10.2, 10.4):
-            confirmation.receive(*tried(at_m))
-        assert kind_of(confirmation.receive(*tried(10.5, T))) == kind
+            confirmation.decide(*tried(at_m))
+        assert kind_of(confirmation.decide(*tried(10.5, T))) == kind
 
 
 def test_our_own_tracking_confirms_and_contradicts_nothing() -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2, 0.4):
-        confirmation.receive(*tried(at_m, by_odometry=False))
-    assert kind_of(confirmation.receive(*tried(0.5, by_odometry=False, **DOUBTFUL))) == "accepted"
-    assert kind_of(confirmation.receive(*tried(0.6, ASIDE, by_odometry=False))) == "accepted"
+        confirmation.decide(*tried(at_m, by_odometry=False))
+    assert kind_of(confirmation.decide(*tried(0.5, by_odometry=False, **DOUBTFUL))) == "accepted"
+    assert kind_of(confirmation.decide(*tried(0.6, ASIDE, by_odometry=False))) == "accepted"
 
 
 def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_others_come() -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2):
-        confirmation.receive(*tried(at_m, ASIDE))
+        confirmation.decide(*tried(at_m, ASIDE))
     right = tried(0.4)
-    hold(confirmation, right, confirmation.receive(*right))
+    hold(confirmation, right, confirmation.decide(*right))
     for at_m in (0.5, 0.6, 0.7):
-        confirmation.receive(*tried(at_m))
+        confirmation.decide(*tried(at_m))
     (late,), _ = confirmation.settle(right.source.stamp_ns)
     assert late.closure.to_ns == right.source.stamp_ns
 
@@ -157,28 +157,28 @@ def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_
 def test_what_is_impossible_or_unlikely_never_waits(evidence: dict[str, object]) -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2, 0.3):
-        confirmation.receive(*tried(at_m))
+        confirmation.decide(*tried(at_m))
     poor = {"perturbation_margin": 0.0, "information": np.diag([1e2] * 6), **evidence}
-    assert isinstance(confirmation.receive(*tried(0.4, **poor)), Rejected)
+    assert isinstance(confirmation.decide(*tried(0.4, **poor)), Rejected)
 
 
 @pytest.mark.parametrize(("margin", "kind"), [(0.01, "refused"), (0.03, "waits")])
 def test_what_nothing_holds_is_not_confirmed_by_neighbours_that_slide_alike(margin: float, kind: type) -> None:
     loose = {**DOUBTFUL, "correlation": 0.3, "perturbation_margin": margin}
-    assert kind_of(Confirmation(PARAMS).receive(*tried(0.4, **loose))) == kind
+    assert kind_of(Confirmation(PARAMS).decide(*tried(0.4, **loose))) == kind
 
 
 def test_nothing_waits_where_no_time_is_given() -> None:
     confirmation = Confirmation(PARAMS.replaced(confirm_seconds=0.0))
     for at_m in (0.0, 0.2, 0.3):
-        confirmation.receive(*tried(at_m))
-    assert isinstance(confirmation.receive(*tried(0.4, **DOUBTFUL)), Rejected)
-    assert kind_of(confirmation.receive(*tried(0.6, ASIDE))) == "accepted"
+        confirmation.decide(*tried(at_m))
+    assert isinstance(confirmation.decide(*tried(0.4, **DOUBTFUL)), Rejected)
+    assert kind_of(confirmation.decide(*tried(0.6, ASIDE))) == "accepted"
 
 
 def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() -> None:
     one = tried(0.0, certain_violations=0.2)
-    verdict = Confirmation(PARAMS).receive(*one)
+    verdict = Confirmation(PARAMS).decide(*one)
     assert isinstance(verdict, Rejected) and verdict.reason is Reason.FREE_SPACE
     assert (verdict.from_ns, verdict.to_ns) == (one.target.stamp_ns, one.source.stamp_ns)
     assert np.array_equal(verdict.T_from_to, TRUE) and verdict.evidence == one.registration.evidence
@@ -188,4 +188,4 @@ def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() 
 
 def test_a_gate_that_refuses_without_a_reason_is_an_error() -> None:
     with pytest.raises(ValueError, match="expected a reason with each refusal, got None"):
-        Confirmation(PARAMS).receive(*tried(0.0)._replace(registration=RefusedRegistration(reason=None)))
+        Confirmation(PARAMS).decide(*tried(0.0)._replace(registration=RefusedRegistration(reason=None)))

@@ -292,16 +292,16 @@ def test_keyframes_that_wait_behind_a_long_search_are_bounded_and_stored_in_the_
     node, said = make(), list[str]()
     node.throttled._write = said.append
     waiting, begun = list[int](), threading.Event()
-    try_candidates = node._registrar._find_closures
+    close_loops = node._registrar._close_loops
 
     def try_for_long(*arguments: Any) -> Any:
         begun.set()
-        *_, budget = arguments
+        _, _, budget, *_ = arguments
         while budget.deadline > time.monotonic() and not budget.hurried():
             time.sleep(0.005)
-        return try_candidates(*arguments)
+        return close_loops(*arguments)
 
-    monkeypatch.setattr(node._registrar, "_find_closures", try_for_long)
+    monkeypatch.setattr(node._registrar, "_close_loops", try_for_long)
     for k in range(30):
         node.searcher.put(Job(10 * k * SECOND, window_at(node, 10 * k), time.monotonic()))
         waiting.append(len(node.searcher))
