@@ -80,13 +80,13 @@ def one(seed: int, peers: list[str], params: MapperParams | None = None) -> dict
     clean = error_of(words, graph, solved(graph).poses)
     limit = graph.params.max_residual
     row["clean_m"], row["methods"] = clean, {}
-    dense = Dense.of(graph)
+    dense = Dense.of(graph, graph.params.picture_sigmas)
     right = np.zeros(len(dense.closures), bool)
     row["methods"][CLEAN_LM] = judged(words, graph, PEERS["GTSAM LM"](dense, limit), right, clean)
     graph, is_false, refused = filled(words, right_only=False, params=params)
     row |= {"closures": len(is_false), "false": int(is_false.sum()), "implausible": refused}
     row["methods"][OURS] = judged(words, graph, solved(graph), is_false, clean)
-    dense = Dense.of(graph)
+    dense = Dense.of(graph, graph.params.picture_sigmas)
     for name in peers:
         try:
             answer = PEERS[name](dense, limit)

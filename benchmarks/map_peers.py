@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import gtsam
 import numpy as np
 
+from objreg_mapper.constraint import EXACT, freed
 from objreg_mapper.optimisation.edges import Edges, edges_of, squared_residuals
 from objreg_mapper.pose_graph import PoseGraph
 from objreg_ros.data.checked import Array
@@ -28,11 +29,15 @@ class Dense(NamedTuple):
     closures: Edges
 
     @classmethod
-    def of(cls, graph: PoseGraph) -> Dense:
-        """What a mapper with one session has: closures that it refused as implausible are not among them."""
+    def of(cls, graph: PoseGraph, picture_sigmas: tuple[float, float] = EXACT) -> Dense:
+        """What a mapper with one session has: closures that it refused as implausible are not among them.
+
+        These are known less well by how far pictures are from their keyframes, m and rad.
+        """
         rows = [(tie.end1.keyframe, tie.end2.keyframe, tie.constraint) for tie in graph.ties]
         first = len(graph.keyframes) - 1
-        return cls(np.array(graph.keyframes.poses), edges_of(rows[:first]), edges_of(rows[first:]))
+        closures = [(k1, k2, freed(constraint, picture_sigmas)) for k1, k2, constraint in rows[first:]]
+        return cls(np.array(graph.keyframes.poses), edges_of(rows[:first]), edges_of(closures))
 
     def between_pictures(self, offset: int) -> Dense:
         """The same with closures between other nodes, whose numbers are higher by an offset."""

@@ -107,7 +107,8 @@ def shortened(words: Walk, metres: float) -> Walk:
 def at_once(words: Walk, names: list[str], with_ours: bool = True) -> dict[str, Any]:
     """Ours, without a solution before the last closure, and peers on the same graph."""
     graph, is_false, _ = filled(words, right_only=False)
-    dense, limit, told = Dense.of(graph), graph.params.max_residual, {}
+    dense, told = Dense.of(graph, graph.params.picture_sigmas), {}
+    limit = graph.params.max_residual
     work: dict[str, Callable[[], Solved]] = {"objreg": lambda: solved(graph)} if with_ours else {}
     work |= {name: lambda name=name: PEERS[name](dense, limit) for name in names}  # type: ignore[misc]
     for name in tqdm(work, desc=f"{len(dense.poses)} keyframes at once"):

@@ -9,7 +9,8 @@
 
 ``robust``: random walks with 10, 20 or 30 % false closures of any size and claimed sigma, a third of the walks with up
 to 10 % that agree with each other. The error of the trajectory over that of our map without the false ones. The peers
-have the same keyframes, steps and closures, those that our mapper refuses as implausible left out, and the same limit.
+have the same keyframes, steps and closures, those that our mapper refuses as implausible left out, and the same limit
+and error of pictures.
 
 ``scale``: a walk through a building with 5 % false closures, solved after each.
 

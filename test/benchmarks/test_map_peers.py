@@ -54,6 +54,16 @@ def test_the_graph_has_a_step_for_each_keyframe_and_all_closures(words: Walk) ->
     assert len(dense.closures) == len(graph.ties) - len(dense.steps)
 
 
+def test_closures_are_known_less_well_where_pictures_are_off(words: Walk) -> None:
+    from map_lies import filled
+    from map_peers import Dense
+
+    graph: PoseGraph = filled(words, right_only=False)[0]
+    exact, off = Dense.of(graph), Dense.of(graph, graph.params.picture_sigmas)
+    assert (np.linalg.det(off.closures.whitening) < np.linalg.det(exact.closures.whitening)).all()
+    np.testing.assert_array_equal(off.steps.whitening, exact.steps.whitening)
+
+
 def test_a_peer_that_there_is_not_is_refused() -> None:
     from map_peers import chosen
 
