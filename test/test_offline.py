@@ -355,7 +355,7 @@ def test_the_json_has_the_keys_that_others_rely_on() -> None:
     wanted = {field.name for field in fields(LoopClosure)} | {"error"}
     assert set(summary["constraints"][0]) == wanted
     assert summary["constraints"][0]["error"] == pytest.approx({"rotation_deg": 0, "translation_cm": 10})
-    others = [told["error"] for told in summary["constraints"][1:]]
+    others = [stated["error"] for stated in summary["constraints"][1:]]
     assert others and not any(others)
     assert summary["truth"]["count"] == 1 and summary["truth"]["translation_cm"]["max"] == pytest.approx(10)
 
@@ -418,8 +418,8 @@ def test_the_json_tells_of_every_refusal() -> None:
     stages, _ = simple_rooms()
     run = run_offline(without("/odom", 1100 * MS), stages, INPUTS)
     expected = {"reason": "no_candidate", "from_ns": 1100 * MS, "to_ns": 1200 * MS, "detail": "no odometry"}
-    told = run.summary(Truth([]))["refusals"][1]
-    assert expected.items() <= told.items() and set(told) == {field.name for field in fields(Rejected)}
+    stated = run.summary(Truth([]))["refusals"][1]
+    assert expected.items() <= stated.items() and set(stated) == {field.name for field in fields(Rejected)}
 
 
 def of_a_lens(frames: int, model: str = "plumb_bob", **names: str) -> Iterator[Record]:
@@ -451,8 +451,8 @@ def test_pictures_and_boxes_of_a_lens_reach_the_segmenter_rectified() -> None:
     run, rectified = seen_of_a_lens(of_a_lens(3), INPUTS)
     assert run.frames == 3 and run.lens.startswith("plumb_bob, moves a pixel by ") and run.lens.endswith("; rectified")
     assert run.summary(Truth([]))["lens"] == run.lens and straight.lens == "none stated: taken as rectified"
-    for (depth, box), (plain, told) in zip(rectified, as_they_are, strict=True):
-        assert depth.shown is not None and plain.shown is None and not np.array_equal(box, told)
+    for (depth, box), (plain, stated) in zip(rectified, as_they_are, strict=True):
+        assert depth.shown is not None and plain.shown is None and not np.array_equal(box, stated)
 
 
 def test_pictures_whose_topics_say_that_they_are_rectified_reach_it_as_they_are() -> None:
@@ -461,8 +461,8 @@ def test_pictures_whose_topics_say_that_they_are_rectified_reach_it_as_they_are(
     _, as_they_are = seen_of_a_lens(records(2), INPUTS)
     run, met = seen_of_a_lens(renamed, inputs)
     assert run.frames == 2 and "taken as rectified" in run.lens
-    for (depth, box), (plain, told) in zip(met, as_they_are, strict=True):
-        assert np.array_equal(depth.depth, plain.depth) and np.array_equal(box, told)
+    for (depth, box), (plain, stated) in zip(met, as_they_are, strict=True):
+        assert np.array_equal(depth.depth, plain.depth) and np.array_equal(box, stated)
     again, met = seen_of_a_lens(of_a_lens(2), INPUTS, "all")
     assert "taken as rectified" in again.lens and met[0][0].shown is None
 
@@ -479,16 +479,16 @@ def test_a_run_tells_what_its_frames_told_of_their_sensor() -> None:
     sensor = SimpleNamespace(
         noise=1.234567, lag=Lag(24.0, 3.5), depth_to_colour=SimpleNamespace(text=lambda: "0.50 deg")
     )
-    told = SimpleNamespace(segment=stages.segmenter.segment, choice=stages.segmenter.choice, sensor=sensor)
-    summary = run_offline(records(2), replace(stages, segmenter=told), INPUTS).summary(Truth([]))
+    stated = SimpleNamespace(segment=stages.segmenter.segment, choice=stages.segmenter.choice, sensor=sensor)
+    summary = run_offline(records(2), replace(stages, segmenter=stated), INPUTS).summary(Truth([]))
     assert summary["depth_noise"] == 1.235 and summary["depth_to_colour"] == "0.50 deg"
     assert summary["depth_lag"] == {"ms": 24.0, "sigma_ms": 3.5}
 
 
 def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
     stages, _ = simple_rooms()
-    told = SimpleNamespace(segment=stages.segmenter.segment, choice=stages.segmenter.choice, sensor=SensorEstimate())
-    summary = run_offline(records(2), replace(stages, segmenter=told), INPUTS).summary(Truth([]))
+    stated = SimpleNamespace(segment=stages.segmenter.segment, choice=stages.segmenter.choice, sensor=SensorEstimate())
+    summary = run_offline(records(2), replace(stages, segmenter=stated), INPUTS).summary(Truth([]))
     assert summary["depth_noise"] is None and summary["depth_lag"] is None
 
 
@@ -503,8 +503,8 @@ def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames
     place = turned_about_x(0.3)
     (stages, chain), (told_rooms, told_chain) = simple_rooms(), simple_rooms()
     run = run_offline(map(other_body, records(2)), stages, INPUTS, tied(place))
-    told = replace(tied(np.eye(4)), registrar=FramesParams(T_base_camera=as_parameter(place)))
-    run_offline(map(other_body, records(2)), told_rooms, INPUTS, told)
+    stated = replace(tied(np.eye(4)), registrar=FramesParams(T_base_camera=as_parameter(place)))
+    run_offline(map(other_body, records(2)), told_rooms, INPUTS, stated)
     assert "/tf_static has the camera's 'camera' on the odometry's 'base'" in run.mount
     for frame, other in zip(chain.frames, told_chain.frames, strict=True):
         np.testing.assert_allclose(frame.T_odom_camera, other.T_odom_camera, atol=1e-9)

@@ -65,8 +65,8 @@ def test_what_becomes_a_keyframe_is_sent_packed_with_the_run_of_its_clock(
     back = unpack_keyframe(sent[1].packed)
     assert back.labels == ("cup",) and back.stamp_ns == SECOND and back.by_odometry
     assert np.allclose(back.T_odom_camera, pose(np.eye(3), np.array([0.3, 0.0, 0.0])))
-    told = by_key(*node.own_diagnostics())
-    assert told["keyframes sent"] == 2 and float(told["kilobytes a keyframe"]) > 0
+    stated = by_key(*node.own_diagnostics())
+    assert stated["keyframes sent"] == 2 and float(stated["kilobytes a keyframe"]) > 0
     assert node.accounting.balance().published == 3
     node.close()
 

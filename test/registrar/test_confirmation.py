@@ -52,10 +52,10 @@ def tried(at_m: float, T: Array = TRUE, by_odometry: bool = True, **evidence: ob
         for number, way in ((2, 100 + at_m), (1, at_m))
     )
     if isinstance(verdict, tuple):
-        told = RefusedRegistration(reason=verdict[0], detail=verdict[1], candidate=found)
+        stated = RefusedRegistration(reason=verdict[0], detail=verdict[1], candidate=found)
     else:
-        told = AcceptedRegistration(T_target_source=found.T_target_source, covariance=np.eye(6), candidate=found)
-    return Pair(source, target, None, told)
+        stated = AcceptedRegistration(T_target_source=found.T_target_source, covariance=np.eye(6), candidate=found)
+    return Pair(source, target, None, stated)
 
 
 def hold(confirmation: Confirmation, one: Pair, held: Decision | Rejected) -> WaitingClosure:

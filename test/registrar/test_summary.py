@@ -150,9 +150,9 @@ def test_a_lie_is_named(lie: Callable[[dict[str, Any]], None], said: str) -> Non
     line, rest = body_of(PACKED).split(b"\n", 1)
     head = json.loads(line)
     lie(head)
-    with pytest.raises(ValueError, match="expected a summary, got") as told:
+    with pytest.raises(ValueError, match="expected a summary, got") as stated:
         unpack_summary(sealed(SUMMARY, json.dumps(head).encode() + b"\n" + rest))
-    assert said in str(told.value)
+    assert said in str(stated.value)
 
 
 @pytest.mark.parametrize(("at", "name"), [(0, "position"), (36, "descriptor")])

@@ -103,8 +103,8 @@ def test_masks_of_our_table_reach_the_segmenter_as_a_message_and_as_a_word() -> 
     instances = np.zeros((60, 80), np.uint16)
     instances[12:18, 11:15] = 1
     word = replace(boxes(1), instances=instances)
-    for told in (word, to_msg.detections_table(word, NAMES)):
-        seen = read(DetectionsIn(NodeBase(), "table"), told, labels=NAMES)  # type: ignore[arg-type]
+    for stated in (word, to_msg.detections_table(word, NAMES)):
+        seen = read(DetectionsIn(NodeBase(), "table"), stated, labels=NAMES)  # type: ignore[arg-type]
         np.testing.assert_array_equal(seen.instances, instances)
 
 

@@ -69,13 +69,13 @@ def test_odometry_that_wanders_far_lets_more_agree() -> None:
 def test_a_cycle_of_true_ties_closes_as_often_as_the_limit_says() -> None:
     rng, chains, count = np.random.default_rng(3), (chain(), chain()), 0
     for _ in range(100):
-        told = []
+        stated = []
         for ends in ((2, 18), (7, 26)):
             exact, noise = tie(*ends), SIGMA * rng.standard_normal(6)
             turned = rotation_from_vector(noise[3:]) @ exact.constraint.T_from_to[:3, :3]
             T = pose(turned, exact.constraint.T_from_to[:3, 3] + noise[:3])
-            told.append(exact._replace(constraint=exact.constraint._replace(T_from_to=T)))
-        count += agrees(told[0], told[1], chains)
+            stated.append(exact._replace(constraint=exact.constraint._replace(T_from_to=T)))
+        count += agrees(stated[0], stated[1], chains)
     assert count >= 96  # 99 %, and odometry here errs not at all
 
 
@@ -115,16 +115,16 @@ def test_none_agree_of_none() -> None:
 
 def test_lies_are_outside_and_come_in_when_more_speak_for_them() -> None:
     chains, known = {0: Chain.of(session(), COUNT, Steady())}, PairwiseConsistency()
-    told = [tie(0, 20), tie(1, 21, aside=1.0), tie(2, 22)]
-    assert known.inconsistent(told, chains) == {1}
-    told += [tie(k, 20 + k, aside=1.0) for k in (3, 4, 5)]
-    assert known.inconsistent(told, chains) == {0, 2}
+    stated = [tie(0, 20), tie(1, 21, aside=1.0), tie(2, 22)]
+    assert known.inconsistent(stated, chains) == {1}
+    stated += [tie(k, 20 + k, aside=1.0) for k in (3, 4, 5)]
+    assert known.inconsistent(stated, chains) == {0, 2}
 
 
 def test_closures_between_other_sessions_say_nothing_of_these() -> None:
     chains = dict.fromkeys((0, 1), Chain.of(session(), COUNT, Steady()))
-    told = [tie(0, 20), tie(2, 22), tie(3, 9, aside=1.0, sessions=(1, 0)), tie(4, 10, aside=1.0, sessions=(1, 0))]
-    assert PairwiseConsistency().inconsistent(told, chains) == frozenset()
+    stated = [tie(0, 20), tie(2, 22), tie(3, 9, aside=1.0, sessions=(1, 0)), tie(4, 10, aside=1.0, sessions=(1, 0))]
+    assert PairwiseConsistency().inconsistent(stated, chains) == frozenset()
 
 
 def test_a_map_with_it_leaves_out_lies_and_is_as_one_without_where_there_are_none() -> None:

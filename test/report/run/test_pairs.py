@@ -30,11 +30,11 @@ def test_a_pair_tells_its_error_where_truth_does() -> None:
 
 
 def test_the_labels_of_a_refusal_are_those_detected_at_both_moments() -> None:
-    told = summary()
+    stated = summary()
     labels = {0: ["cup", "book"], 70: ["book", "mug"]}
-    told["glimpses"] = [{"stamp_ns": k * STEP_NS, "labels": names} for k, names in labels.items()]
-    told["refusals"] = [refusal("texture_disagrees", 0, 70), refusal("texture_disagrees", 0, 71)]
-    assert [pair.labels for pair in pairs_of(RunSummary.of("walk", told, TRUTH))[-2:]] == [("book",), ()]
+    stated["glimpses"] = [{"stamp_ns": k * STEP_NS, "labels": names} for k, names in labels.items()]
+    stated["refusals"] = [refusal("texture_disagrees", 0, 70), refusal("texture_disagrees", 0, 71)]
+    assert [pair.labels for pair in pairs_of(RunSummary.of("walk", stated, TRUTH))[-2:]] == [("book",), ()]
 
 
 def test_what_was_refused_says_why_and_what_moved_says_so() -> None:
@@ -45,16 +45,16 @@ def test_what_was_refused_says_why_and_what_moved_says_so() -> None:
 
 
 def test_false_constraints_are_looked_at_first_and_what_was_not_tried_last() -> None:
-    told = summary(false=True)
-    told["refusals"][1]["T_from_to"] = np.eye(4).tolist()
-    order = [pair.key for pair in by_interest(pairs_of(RunSummary.of("walk", told, TRUTH)))]
+    stated = summary(false=True)
+    stated["refusals"][1]["T_from_to"] = np.eye(4).tolist()
+    order = [pair.key for pair in by_interest(pairs_of(RunSummary.of("walk", stated, TRUTH)))]
     assert order == ["c4", "c0", "c1", "c2", "c3", "r1", "r2", "r0"]
 
 
 def test_a_pair_of_two_cameras_names_them_with_their_robots() -> None:
-    told = summary()
-    told["constraints"][0] |= {"from_robot": "a", "to_robot": "b", "from_frame_id": "front", "to_frame_id": "front"}
-    told["constraints"][1] |= {"from_frame_id": "front", "to_frame_id": "rear"}
-    first, second, third, *_ = pairs_of(RunSummary.of("run", told, TRUTH))
+    stated = summary()
+    stated["constraints"][0] |= {"from_robot": "a", "to_robot": "b", "from_frame_id": "front", "to_frame_id": "front"}
+    stated["constraints"][1] |= {"from_frame_id": "front", "to_frame_id": "rear"}
+    first, second, third, *_ = pairs_of(RunSummary.of("run", stated, TRUTH))
     assert first.text.startswith("a/front, then b/front") and second.text.startswith("front, then rear")
     assert ", then " not in third.text
