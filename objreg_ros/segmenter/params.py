@@ -58,9 +58,15 @@ class SegmenterParams(Params):
             raise ValueError(f"z_max: expected more than z_min ({self.z_min:g}), got {self.z_max:g}")
 
     @property
-    def limits(self) -> tuple[float, float]:
-        """The passthrough limits (z_max, y_max) in metres that hold for the preset."""
-        return (PAPER_Z_MAX, PAPER_Y_MAX) if self.preset == "paper" else (self.z_max, self.y_max)
+    def limits(self) -> tuple[float, float, float]:
+        """The passthrough limits (z_min, z_max, y_max) in metres that hold for the preset."""
+        z_max, y_max = (PAPER_Z_MAX, PAPER_Y_MAX) if self.preset == "paper" else (self.z_max, self.y_max)
+        return self.z_min, z_max, y_max
+
+    @property
+    def jump_bounds(self) -> tuple[float, float]:
+        """(a, b) of the depth step a + b z² in metres between two surfaces."""
+        return self.jump, self.jump_z2
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ class Scene:
     def ground(self, image: DepthImage) -> Ground:
         """What the segmenter knows of a whole image of the scene where it is told the way up."""
         params = SegmenterParams()
-        limits, jump = (params.z_min, *params.limits), (params.jump, params.jump_z2)
+        limits, jump = params.limits, params.jump_bounds
         surface = reduce(image.depth, self.camera, cell_size(*image.depth.shape), limits, jump)
         coarse = surface.every(2)
         supports = find_supports(coarse, self.camera, self.up, params.support_area, jump)

@@ -10,11 +10,11 @@ from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 
 
 def test_the_limits_are_those_that_are_set() -> None:
-    assert SegmenterParams(z_max=3.5, y_max=0.9).limits == (3.5, 0.9)
+    assert SegmenterParams(z_max=3.5, y_max=0.9).limits == (0.2, 3.5, 0.9)
 
 
 def test_preset_paper_has_the_limits_of_the_founding_method_whatever_is_set() -> None:
-    assert SegmenterParams(preset="paper", z_max=3.5, y_max=0.9).limits == (1.75, 0.75)
+    assert SegmenterParams(preset="paper", z_max=3.5, y_max=0.9).limits == (0.2, 1.75, 0.75)
 
 
 def test_where_the_camera_is_mounted_is_a_pose_and_nothing_is_none() -> None:

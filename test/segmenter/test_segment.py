@@ -182,9 +182,9 @@ def test_instances_of_any_size_take_the_place_of_what_stands_in_the_boxes(every:
         half[:, : int(np.flatnonzero(half.any(axis=0)).mean())] = False
     numbers = (halves[0] + 2 * halves[1].astype(np.uint16)).astype(np.uint16)
     frame = Segmenter().segment(replace(asked, instances=np.ascontiguousarray(numbers[::every, ::every])), image)
-    told = Segmenter().segment(asked, image, masks=halves)
+    masked = Segmenter().segment(asked, image, masks=halves)
     assert len(frame.objects) == 2
-    for one, other, half in zip(frame.objects, told.objects, halves, strict=True):
+    for one, other, half in zip(frame.objects, masked.objects, halves, strict=True):
         assert abs(len(one) - half.sum()) < 0.06 * half.sum()
         if every == 1:
             np.testing.assert_array_equal(one.xyz, other.xyz)

@@ -8,7 +8,6 @@ import math
 from objreg_ros.data.images import Detections
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 pixels; x1 and y1 are outside
-NOTHING: Box = 0, 0, 0, 0
 
 
 def pixel_boxes(detections: Detections, height: int, width: int) -> list[Box]:

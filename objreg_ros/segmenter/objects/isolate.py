@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +11,12 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import PointFlag
 from objreg_ros.data.images import DepthImage
+from objreg_ros.segmenter.objects import paper
 from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.objects.extract import Pixels, colours, extract
 from objreg_ros.segmenter.objects.flags import whole_flags
 from objreg_ros.segmenter.objects.selection import select
+from objreg_ros.segmenter.objects.targets import Outline, Target
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.surface.cells import Surface, Window
 from objreg_ros.segmenter.surface.components import split
@@ -46,9 +49,18 @@ class Cells(NamedTuple):
     step: int
 
 
+def isolate_target(image: DepthImage, target: Target, ground: Ground, params: SegmenterParams) -> Isolated:
+    """The object that a detection shows: by its mask, by the founding filter, or by what stands in its box."""
+    if target.outline is not None:
+        return cut_out(image, target.box, target.outline, ground, params)
+    if params.preset == "paper":
+        return Isolated(paper.cut(image, target.box, params), PointFlag(0), None)
+    return isolate(image, target.box, ground, params)
+
+
 def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams) -> Isolated:
     """The object that ``box``, which must not be empty, shows: no pixel outside it, and none for no object."""
-    jump = (params.jump, params.jump_z2)
+    jump = params.jump_bounds
     grid = _grid(box, ground, params.margin)
     window = _cells(box, grid)
     crop = _expanded(window, params.margin, grid)
@@ -65,20 +77,13 @@ def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams
     return Isolated(pixels, flags, Cells(chosen, crop, grid.step))
 
 
-class Outline(NamedTuple):
-    """The pixels of the picture where ``numbers (H, W)`` are ``own``: a mask, of bool or of instances."""
-
-    numbers: Array
-    own: int = 1
-
-
 def cut_out(image: DepthImage, box: Box, mask: Outline, ground: Ground, params: SegmenterParams) -> Isolated:
     """What ``mask`` of the picture covers within ``box``, taken as it is but for what is not measured.
 
     A pixel belongs to the mask by its cell, and by its depth: what the mask's edge takes of the background is left out
     as far as it is another cell's.
     """
-    jump = (params.jump, params.jump_z2)
+    jump = params.jump_bounds
     grid = _grid(box, ground, params.margin)
     crop = _expanded(_cells(box, grid), params.margin, grid)
     around, (left, top, right, bottom) = grid.crop(crop), crop
@@ -92,11 +97,14 @@ def cut_out(image: DepthImage, box: Box, mask: Outline, ground: Ground, params: 
     return Isolated(pixels, flags, Cells(chosen, crop, grid.step))
 
 
-def mark(taken: Array, cells: Cells, ground: Ground) -> None:
-    """Mark the cells of an object in ``taken (h, w) bool`` of the whole frame."""
-    scale = cells.step // ground.surface.step
-    left, top, right, bottom = cells.window
-    taken[::scale, ::scale][top:bottom, left:right] |= cells.chosen
+def taken_cells(found: Iterable[Isolated], ground: Ground) -> Array:
+    """The cells (h, w) bool of the whole frame that are of what was found in boxes."""
+    taken = np.zeros(ground.surface.depth.shape, np.bool_)
+    for cells in (one.cells for one in found if one.cells is not None):
+        scale = cells.step // ground.surface.step
+        left, top, right, bottom = cells.window
+        taken[::scale, ::scale][top:bottom, left:right] |= cells.chosen
+    return taken
 
 
 def _grid(box: Box, ground: Ground, margin: float) -> Surface:

@@ -25,12 +25,12 @@ def cut(image: DepthImage, box: Box, params: SegmenterParams) -> Pixels:
     """The pixels of ``box`` that pass the filter, without normals; none where fewer than `min_points` are left."""
     x0, y0, x1, y1 = box
     camera = image.intrinsics
-    z_max, y_max = params.limits
+    z_min, z_max, y_max = params.limits
     z = image.depth[y0:y1, x0:x1]
     with np.errstate(invalid="ignore"):  # depth may be infinite
         x = z * ((np.arange(x0, x1) - camera.cx) / camera.fx).astype(np.float32)[None, :]
         y = z * ((np.arange(y0, y1) - camera.cy) / camera.fy).astype(np.float32)[:, None]
-        passed = (z > params.z_min) & (z < z_max) & (np.abs(y) < y_max)
+        passed = (z > z_min) & (z < z_max) & (np.abs(y) < y_max)
     v, u = np.nonzero(passed)
     xyz = np.stack([x[passed], y[passed], z[passed]], axis=-1)
     kept = _off_plane(xyz) if len(xyz) >= params.min_points else np.zeros(len(xyz), bool)

@@ -17,7 +17,7 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import PointFlag
 from objreg_ros.data.images import DepthImage
-from objreg_ros.segmenter.objects.boxes import Box, is_empty
+from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.objects.extract import Pixels, extract
 from objreg_ros.segmenter.objects.flags import whole_flags
 from objreg_ros.segmenter.params import SegmenterParams
@@ -27,7 +27,6 @@ from objreg_ros.segmenter.surface.seams import find_seams
 from objreg_ros.segmenter.surface.support import Ground
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
-PERSON = "person"  # the label of what comes and goes
 MOST = 6  # unnamed objects of a frame
 REACH = 3  # cells that a support is thought to go on, and in which what is beyond a border is looked for
 NEAR = np.float32(1.5)  # tolerances of a plane within which a cell is of it
@@ -77,17 +76,19 @@ class Part(NamedTuple):
 def find_unnamed(
     image: DepthImage, ground: Ground, taken: Array, people: Sequence[Box], params: SegmenterParams
 ) -> list[UnnamedPixels]:
-    """At most MOST unnamed objects, the most certain first.
+    """At most MOST unnamed objects, the most certain first; none where the parameters ask for none.
 
     ``taken (h, w) bool`` are the cells of the whole frame that are of a named object, ``people`` the boxes of persons
     in pixels of the image.
     """
-    grid, jump = ground.coarse, (params.jump, params.jump_z2)
+    if not params.unnamed or params.preset == "paper":
+        return []
+    grid, jump = ground.coarse, params.jump_bounds
     scale = grid.step // ground.surface.step
     taken = np.ascontiguousarray(taken[::scale, ::scale])
     level = _level(ground)
     whole, count = connect(grid.depth, (grid.depth > 0) & ~level, jump)
-    around = _Surroundings(level, taken, [box for box in people if not is_empty(box)])
+    around = _Surroundings(level, taken, people)
     found = _unnamed(whole, count, around, ground, jump)
     done = level.copy()
     for one in found:  # what is an object as a whole is not parted
@@ -268,7 +269,7 @@ def _cut(image: DepthImage, grid: Surface, one: Part, params: SegmenterParams) -
     height, width = image.depth.shape
     first = max(0, (left - 1) * grid.step), max(0, (top - 1) * grid.step)
     box = (*first, min(width, (right + 1) * grid.step), min(height, (bottom + 1) * grid.step))
-    pixels = extract(image, box, around, chosen, (params.jump, params.jump_z2))
+    pixels = extract(image, box, around, chosen, params.jump_bounds)
     flags = whole_flags(image, pixels, around, chosen, here)
     if len(pixels) < params.min_points or flags & PointFlag.WALL_LIKE:
         return None

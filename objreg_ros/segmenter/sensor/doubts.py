@@ -15,7 +15,7 @@ def range_doubt(depth: DepthImage, view: View, params: SegmenterParams) -> str |
     """Text where depth was measured, but none of it, by its ``view``, within the limits of ``params``; else None."""
     if np.isfinite(view.xyz[..., 2]).any():
         return None
-    z_min, z_max = params.z_min, params.limits[0]
+    z_min, z_max, _ = params.limits
     measured = depth.depth[np.isfinite(depth.depth) & (depth.depth > 0)]
     if not len(measured) or _within(measured, z_min, z_max):
         return None

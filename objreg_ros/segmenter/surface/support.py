@@ -14,6 +14,7 @@ from objreg_ros.segmenter.surface.cells import EXACT, MIN_COSINE, Surface
 from objreg_ros.segmenter.surface.components import connect
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
+COARSE = 2  # every so many cells of a frame are used for gravity and the supports
 MAX_SUPPORTS = 6
 BIN = 0.015  # metres of height
 TILT = np.float32(np.cos(np.radians(20.0)))  # a cell of a level surface is no farther from up than this
@@ -53,7 +54,7 @@ class SupportPlane:
 class Ground:
     """What the whole frame gives: the direction up (3,) or None, its confidence, the support surfaces.
 
-    ``surface`` is the whole frame in cells, ``coarse`` the grid of the supports, every other cell of it."""
+    ``surface`` is the whole frame in cells, ``coarse`` every `COARSE`-th cell of it, the grid of the supports."""
 
     up: Array | None
     confidence: float
@@ -63,12 +64,15 @@ class Ground:
 
 
 def find_supports(
-    surface: Surface, camera: Intrinsics, up: Array, min_area: float, jump: tuple[float, float]
+    surface: Surface, camera: Intrinsics, up: Array | None, min_area: float, jump: tuple[float, float]
 ) -> list[SupportPlane]:
     """The level surfaces of a frame, largest first; ``up (3,)`` in the camera frame, ``jump`` as in `connect`.
 
     Heights along ``up`` vote in bins with the area that each cell covers; each peak is fitted by least squares.
+    None where up is not known.
     """
+    if up is None:
+        return []
     height, area = np.empty_like(surface.depth), np.empty_like(surface.depth)
     grid = (surface.depth, surface.normals, surface.x, surface.y)
     pixel = np.float32(surface.step**2 / (camera.fx * camera.fy))

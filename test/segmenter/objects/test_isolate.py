@@ -11,7 +11,8 @@ import pytest
 from objreg_ros.data.frames import PointFlag
 from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.boxes import Box, pixel_boxes
-from objreg_ros.segmenter.objects.isolate import Cells, Isolated, Outline, cut_out, isolate, mark
+from objreg_ros.segmenter.objects.isolate import Cells, Isolated, cut_out, isolate, taken_cells
+from objreg_ros.segmenter.objects.targets import Outline
 from objreg_ros.segmenter.params import SegmenterParams
 from segmenter.scenes import CAMERA, Scene, two_boxes
 
@@ -121,14 +122,14 @@ def test_without_colour_the_object_is_the_same_but_for_it(boxes: Scene) -> None:
 
 
 @pytest.mark.parametrize("step", [2, 4])
-def test_the_cells_of_an_object_are_marked_on_the_grid_of_the_supports_and_no_mark_is_taken_back(step: int) -> None:
+def test_the_cells_of_all_objects_are_taken_on_the_grid_of_the_supports(step: int) -> None:
     scene = Scene()
     ground = scene.ground(scene.image())
-    taken = np.zeros((240, 320), bool)
-    taken[20:22, 30:32] = True
+    pixels = isolated(two_boxes(), pixel_box(two_boxes(), 2)).pixels
     chosen = np.zeros((6, 8), bool)
     chosen[1:5, 2:4] = True
-    mark(taken, Cells(chosen, (14, 8, 22, 14), step), ground)
+    cells = [Cells(np.ones((2, 2), bool), (30, 20, 32, 22), 2), Cells(chosen, (14, 8, 22, 14), step), None]
+    taken = taken_cells([Isolated(pixels, PointFlag(0), one) for one in cells], ground)
     coarse = np.zeros((120, 160), bool)
     coarse[10, 15] = True
     if step == 4:

@@ -20,7 +20,7 @@ def of(depth: np.ndarray, frame_id: str = "") -> DepthImage:
 
 
 def doubt_of_range(depth: np.ndarray, params: SegmenterParams = PARAMS) -> str | None:
-    return range_doubt(of(depth), reduced_view(of(depth), 4, params.z_min, params.limits[0]), params)
+    return range_doubt(of(depth), reduced_view(of(depth), 4, *params.limits[:2]), params)
 
 
 def flat(z: float) -> np.ndarray:
