@@ -97,7 +97,7 @@ def write_store(path: Path) -> None:
                 evidence={"correlation": 0.5 + k},
             )  # fmt: skip
             sightings = [s.of_landmark(8 * k + n + 1, np.eye(3)) for n, s in enumerate(sightings_of(keyframe))]
-            store.add(keyframe, sightings, [tie])
+            store.write_keyframe(keyframe, sightings, [tie])
 
 
 def _said(path: Path, read_only: bool) -> dict[str, Any]:

@@ -149,7 +149,7 @@ class Side:
     def _seen(self) -> Iterable[Any]:
         for k in range(2):
             self.registrar.track(frame_word((1 + 10 * k) * SECOND, 4))
-            (window,) = self.registrar.end()
+            (window,) = self.registrar.end_windows()
             yield self.registrar.search(window)
 
     def keyframe(self) -> Any:

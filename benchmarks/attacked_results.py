@@ -64,7 +64,7 @@ def use_result(recording: Path, file: Path, summary: dict[str, Any]) -> None:
     """As `objreg batch` uses what it found; WrongAnswerError where the row is not what stands in the file."""
     row = Row.of(recording, file.name, summary)
     with batch_tables(file.parent) as tables:
-        tables.add(row, summary)
+        tables.add_recording(row, summary)
     batch_page([row], {})
     if (row.frames, row.constraints) != (summary["frames"], len(summary["constraints"])):
         raise WrongAnswerError(f"{row.frames} frames and {row.constraints} constraints are not those of the file")

@@ -67,7 +67,7 @@ def _written(work: BatchWork, recordings: Sequence[Path]) -> list[Row]:
             if summary is None:
                 raise OSError(f"{recording}: expected its result, got none")
             rows.append(Row.of(recording, work.file(recording).name, summary))
-            tables.add(rows[-1], summary)
+            tables.add_recording(rows[-1], summary)
     return rows
 
 

@@ -65,7 +65,7 @@ def shown_of(frames: Iterable[Frame]) -> list[Shown]:
     """The keyframes of frames, with their objects."""
     params = RegistrarParams()
     keyframer = Keyframer(params, SessionNumbers(1))
-    windows = [keyframer.add(frame) for frame in frames] + [keyframer.finish()]
+    windows = [keyframer.add_frame(frame) for frame in frames] + [keyframer.finish_window()]
     keyframes = [fuse(window, params) for window in windows if window is not None]
     return [
         Shown(keyframe.stamp_ns, np.array([item.centroid for item in keyframe.objects]), sightings_of(keyframe))
@@ -122,7 +122,7 @@ def _in_turn(placed: Sequence[tuple[Sighting, ...]], pairs: Sequence[Sequence[tu
     for sightings, words in zip(placed, pairs, strict=True):
         links = [Link(index=i, of=known[there][j], R_there_here=np.eye(3)) for i, there, j in words]
         assigned, merged = landmarks.assign(sightings, links)
-        landmarks.add(assigned, merged)
+        landmarks.add_sightings(assigned, merged)
         known = [_renamed(row, merged) for row in known] + [assigned]
     return [tuple(sighting.landmark for sighting in row) for row in known]
 

@@ -64,7 +64,7 @@ def solved(graph: PoseGraph) -> Solved:
     """As our mapper has it."""
     problem = graph.problem()
     solution = problem.solve()
-    graph.adopt(problem, solution)
+    graph.adopt_solution(problem, solution)
     return Solved(np.array([T for _, T in graph.path()]), solution.kept)
 
 

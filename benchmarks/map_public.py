@@ -121,8 +121,8 @@ def _believed(public: Public) -> Array:
         steps = _until(dense, graph.count, int(max(closure.k1[0], closure.k2[0])))
         if len(steps):
             graph.grow(_along(graph.poses(), steps), steps)
-        graph.add(closure)
-        graph.settle()
+        graph.add_edges(closure)
+        graph.solve_poses()
     steps = _until(dense, graph.count, len(dense.poses) - 1)
     poses = graph.poses()
     return np.concatenate([poses, _along(poses, steps)])

@@ -54,7 +54,7 @@ GICP_VOXEL = 0.03  # m, of the whole frames that finish a peer's pose
 def fused(frames: Sequence[Frame], params: RegistrarParams) -> list[Keyframe]:
     """The keyframes that the registrar would make of a recording."""
     keyframer = Keyframer(params)
-    windows = [keyframer.add(frame) for frame in frames] + [keyframer.finish()]
+    windows = [keyframer.add_frame(frame) for frame in frames] + [keyframer.finish_window()]
     return [fuse(window, params) for window in windows if window is not None]
 
 

@@ -98,11 +98,11 @@ def arrivals(team: Team) -> Iterator[Arrival]:
     """The keyframes that each robot makes, in the order in which they are ready."""
     keyframers = {name: Keyframer(PARAMS) for name in team}
     for frame in in_order(team):
-        window = keyframers[frame.robot].add(frame)
+        window = keyframers[frame.robot].add_frame(frame)
         if window is not None:
             yield Arrival(fuse(window, PARAMS), window.clock, frame.robot)
     for name, keyframer in keyframers.items():
-        if (window := keyframer.finish()) is not None:
+        if (window := keyframer.finish_window()) is not None:
             yield Arrival(fuse(window, PARAMS), window.clock, name)
 
 
@@ -113,7 +113,7 @@ def packed(team: Team) -> tuple[list[LoopClosure], dict[str, Any]]:
         data = pack_keyframe(arrival.keyframe)
         sizes.append(len(data))
         came = replace(unpack_keyframe(data), robot=arrival.keyframe.robot)
-        outcome = registrar.receive(arrival._replace(keyframe=came))
+        outcome = registrar.receive_keyframe(arrival._replace(keyframe=came))
         closures += () if outcome is None else outcome.closures
     closures += registrar.settle().closures
     registrar.close()
@@ -140,14 +140,14 @@ class Peers:
             return
         self.sizes.append(len(summary))
         for other in self._others(name):
-            if (request := other.receive(summary)) is not None:
+            if (request := other.receive_summary(summary)) is not None:
                 self.exchanges[name].note(request, now)
 
     def answer(self, now: float) -> None:
         """All that may be sent now."""
         for name, exchange in self.exchanges.items():
             while (packed := exchange.answer(now)) is not None:
-                outcomes = [other.take(packed) for other in self._others(name)]
+                outcomes = [other.receive_delivery(packed) for other in self._others(name)]
                 self.closures += [c for outcome in outcomes if outcome is not None for c in outcome.closures]
 
     def _others(self, name: str) -> list[Exchange]:

@@ -119,7 +119,7 @@ def remember(store: Path, frames: Iterable[Frame]) -> None:
     """Store the keyframes of a room, and search for nothing."""
     with closing(Registrar(RegistrarParams(store=str(store)))) as registrar:
         windows = [registrar.track(frame) for frame in frames]
-        for window in (*windows, *registrar.end()):
+        for window in (*windows, *registrar.end_windows()):
             if window is not None:
                 registrar.search(window, seconds=0.0)
 
@@ -127,7 +127,7 @@ def remember(store: Path, frames: Iterable[Frame]) -> None:
 def keyframes_of(frames: Iterable[Frame], params: RegistrarParams, session: int, first_id: int) -> list[Keyframe]:
     """The keyframes that the registrar makes of a recording, numbered."""
     keyframer = Keyframer(params, SessionNumbers(session))
-    windows = [*(keyframer.add(frame) for frame in frames), keyframer.finish()]
+    windows = [*(keyframer.add_frame(frame) for frame in frames), keyframer.finish_window()]
     made = [fuse(window, params) for window in windows if window is not None]
     return [keyframe.numbered(first_id + k) for k, keyframe in enumerate(made)]
 
@@ -169,7 +169,7 @@ def found_among(
 ) -> Found:
     """The same for keyframes of which is known which could close with which."""
     index, hits, seconds = Index(params), 0, 0.0
-    index.add(others)
+    index.add_objects(others)
     for k, keyframe in enumerate(keyframes):
         sightings = sightings_of(keyframe)
         began = time.process_time()
@@ -177,7 +177,7 @@ def found_among(
         seconds += time.process_time() - began
         rows = [candidate.keyframe_id - keyframes[0].keyframe_id for candidate in candidates]
         found = [keyframes[row].session for row in rows if row >= 0 and right[k, row]]
-        index.add(sightings)
+        index.add_objects(sightings)
         hits += bool(found)
         if found and hits % ACCEPTED_EACH == 0:
             index.meet(keyframe.session, found[0])

@@ -52,7 +52,7 @@ def frames_of(sensor: str, rig: RigParams, seed: int, count: int, rate: float) -
     cameras, motion = Rig(rig, camera, seed), Motion(plan.T_world_camera, plan.rate)
     for k in range(count):
         seconds, scene = k / plan.rate, plan.scenes[int(plan.scene_of[k])]
-        seen = cameras.take(scene, motion, seconds, k, depth, threads=2)
+        seen = cameras.take_picture(scene, motion, seconds, k, depth, threads=2)
         late = inverse(motion.at(seconds)) @ motion.at(seconds - 1e-3 * rig.lag_ms) @ cameras.T_colour_depth
         image = DepthImage(depth=seen.depth, rgb=seen.rgb, intrinsics=camera, stamp_ns=round(1e9 * seconds))
         yield image, vector_from_rotation(late[:3, :3])

@@ -118,7 +118,7 @@ def draw_sensors(path: Path, plan: RecordingPlan) -> None:
     scene, T = plan.scenes[0], plan.T_world_camera[SHOWN]
     images = [render(scene, T, CAMERAS[camera], 1, depth) for camera, depth in SENSORS.values()]
     motion = Motion(plan.T_world_camera, plan.rate)
-    images.append(Rig(BUILT, KINECT, 1).take(scene, motion, SHOWN / plan.rate, 1))
+    images.append(Rig(BUILT, KINECT, 1).take_picture(scene, motion, SHOWN / plan.rate, 1))
     cv2.imwrite(str(path), np.vstack([_beside(image) for image in images]))
 
 

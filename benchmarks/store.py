@@ -89,7 +89,7 @@ def write_forever(path: str, seed: int) -> None:
     pattern = make_keyframe(0, draw)
     while True:
         keyframe = replace(pattern, keyframe_id=store.next_keyframe())
-        store.add(keyframe, sightings_of(keyframe))
+        store.write_keyframe(keyframe, sightings_of(keyframe))
         os.write(1, f"{keyframe.keyframe_id}\n".encode())
 
 
@@ -106,7 +106,7 @@ def measure_size(objects: int, folder: Path) -> dict[str, Any]:
         single = [_ms(index.query, [row]) for rows in asked for row in rows[:4]]
         whole = [_ms(index.query, rows) for rows in asked]
         keyframes = [make_keyframe(store.next_keyframe() + i, draw) for i in range(SAMPLES // 3)]
-        insert = [_ms(store.add, keyframe, sightings_of(keyframe)) for keyframe in keyframes]
+        insert = [_ms(store.write_keyframe, keyframe, sightings_of(keyframe)) for keyframe in keyframes]
     path.unlink()
     return {
         "insert_ms": _percentiles(insert),
@@ -122,7 +122,7 @@ def measure_size(objects: int, folder: Path) -> dict[str, Any]:
 def _remembered(store: Store) -> tuple[Index, Landmarks]:
     """What a registrar holds in memory beside the heads of the keyframes."""
     index, landmarks = Index(RegistrarParams(min_gap=0.0)), Landmarks(RegistrarParams(), first=store.next_landmark())
-    index.add(landmarks.passing(store.sightings()))
+    index.add_objects(landmarks.passing(store.sightings()))
     return index, landmarks
 
 
@@ -178,7 +178,7 @@ def _fill(path: Path, objects: int, draw: np.random.Generator, points: int) -> N
     with closing(Store(path)) as store:
         for number in range(1, made + 1):
             keyframe = make_keyframe(number, draw, points)
-            store.add(keyframe, [_landmark(s, i) for i, s in enumerate(sightings_of(keyframe))])
+            store.write_keyframe(keyframe, [_landmark(s, i) for i, s in enumerate(sightings_of(keyframe))])
         for shift in range(made, keyframes, made):
             with store._changing() as (transaction, counters):
                 _copy_keyframes(transaction, counters, shift, made)

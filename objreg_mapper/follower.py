@@ -23,9 +23,9 @@ class Follower:
         self.has_news = False
         self.count = self.passed_over_count = 0
         self._ended_ns = 0  # the last stamp of the run of the clock before this one
-        self.forget(max_speed)
+        self.believe_next(max_speed)
 
-    def forget(self, max_speed: float) -> None:
+    def believe_next(self, max_speed: float) -> None:
         """Whatever comes next is believed."""
         self._restart = Restart(max_speed, self._pass_over)
 
@@ -39,7 +39,7 @@ class Follower:
         if self.newest is not None and odometry.stamp_ns > self.newest.stamp_ns:
             self._on_leap()
 
-    def follow(self, odometry: Odometry, graph: PoseGraph) -> None:
+    def follow_pose(self, odometry: Odometry, graph: PoseGraph) -> None:
         """Take a pose that was admitted into the graph."""
         self.count, self.newest = self.count + 1, odometry
         self.has_news = graph.add_odometry(odometry, self.robot) or self.has_news

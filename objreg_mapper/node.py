@@ -101,7 +101,7 @@ class MapperNode(NodeBase):
         for closure in self._waiting.take_out():
             self.drop(closure.to_ns, reason)
 
-    def adopt(self) -> None:
+    def apply_parameters(self) -> None:
         """Live parameters hold from the next odometry, closure and solution on."""
         self._inputs = self.settings.of(MapperNodeParams)
         with self._graph_lock:
@@ -126,7 +126,7 @@ class MapperNode(NodeBase):
             self._begin_elsewhere(follower, admission.anew, admission.poses[0].stamp_ns)
         for admitted in admission.poses:
             with self._graph_lock:
-                follower.follow(admitted, self._graph)
+                follower.follow_pose(admitted, self._graph)
             self._publish_correction(follower, self._inputs.publish_tf)
             self._tie_what_waits()
 
@@ -170,7 +170,7 @@ class MapperNode(NodeBase):
 
     def _leave(self, closure: LoopClosure, reason: str, text: str = "") -> None:
         """Drop a closure; received again, it is a new one."""
-        self._closures.forget(closure)
+        self._closures.forget_closure(closure)
         self.drop(closure.to_ns, reason, text)
 
     def _learn(self, closure: LoopClosure) -> None:
@@ -215,7 +215,7 @@ class MapperNode(NodeBase):
         with self._graph_lock:
             settled, self._riding = self._riding[:riding], self._riding[riding:]
             if graph is self._graph:
-                self._summary = graph.adopt(problem, solution)
+                self._summary = graph.adopt_solution(problem, solution)
                 for follower in self._followers.values():
                     follower.has_news = True
             summary = self._summary
@@ -305,7 +305,7 @@ class MapperNode(NodeBase):
 
     def _reset(self, _: Any, response: Any) -> Any:
         for follower in self._followers.values():
-            follower.forget(self.settings.of(MapperParams).max_speed)
+            follower.believe_next(self.settings.of(MapperParams).max_speed)
         self._start_anew("reset")
         response.success, response.message = True, "started a new map"
         return response

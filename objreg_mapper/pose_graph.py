@@ -53,7 +53,7 @@ class PoseGraph:
     def __init__(self, params: MapperParams | None = None) -> None:
         self.params = params or MapperParams()
         self.sessions = Sessions()
-        self.sessions.begin()
+        self.sessions.begin_session()
         self._closures: list[Tie] = []
         self._withdrawn: set[int] = set()
         self._solver, self._doubts = Solver(), Doubts()
@@ -64,7 +64,7 @@ class PoseGraph:
 
     def begin_session(self, name: int | None = None, robot: str = "") -> None:
         """Odometry of a robot from now on is of another run; nothing ties it to the runs before."""
-        self.sessions.begin(name, robot)
+        self.sessions.begin_session(name, robot)
 
     def add_odometry(self, odometry: Odometry, robot: str = "") -> bool:
         """Take the newest pose; True if it became a keyframe. ValueError if time does not advance.
@@ -73,7 +73,7 @@ class PoseGraph:
         """
         if self.sessions.newest(robot) is None:
             self.begin_session(robot=robot)
-        return self._going_on(robot).add(odometry, self.params)
+        return self._going_on(robot).add_pose(odometry, self.params)
 
     def add_closure(self, closure: LoopClosure, T_body_camera: Array | Mounting | None = None) -> bool:
         """Tie the two keyframes nearest to the closure's stamps; False if odometry does not cover both (yet).
@@ -148,7 +148,7 @@ class PoseGraph:
     def optimise(self) -> MapSummary:
         """Solve and adopt in one go."""
         problem = self.problem()
-        return self.adopt(problem, problem.solve())
+        return self.adopt_solution(problem, problem.solve())
 
     def problem(self) -> Problem:
         """What there is to solve now; solved by one thread, while another goes on with the graph."""
@@ -164,7 +164,7 @@ class PoseGraph:
             self._doubts.of(self._closures, self.sessions, self.params) - self._withdrawn,
         )
 
-    def adopt(self, problem: Problem, solution: Solution) -> MapSummary:
+    def adopt_solution(self, problem: Problem, solution: Solution) -> MapSummary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""
         self._solution = solution
         self._T_map_odom = {

@@ -34,7 +34,7 @@ class Session:
         self.variances: list[tuple[float, float]] = []  # of each step between keyframes: m^2 and rad^2 in every axis
         self._path_m = [0.0]
 
-    def add(self, odometry: Odometry, params: MapperParams) -> bool:
+    def add_pose(self, odometry: Odometry, params: MapperParams) -> bool:
         """Take the next pose; whether it became a keyframe. ValueError if time does not advance."""
         self.odometry.append(odometry.stamp_ns, odometry.T_odom_body)
         if not self._moved_on(odometry.T_odom_body, params):

@@ -33,7 +33,7 @@ class Sessions(list[Session]):
     robot: among all where it names none, and in those of an odometry that has no name.
     """
 
-    def begin(self, name: int | None = None, robot: str = "") -> None:
+    def begin_session(self, name: int | None = None, robot: str = "") -> None:
         """Odometry of a robot is of another run from now on."""
         if self and len(self[-1].keyframes) == 0:
             self.pop()

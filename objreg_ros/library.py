@@ -208,7 +208,7 @@ def _segment(
         image, detections = lens.rectify(image), lens.rectify_detections(detections)
         masks = masks and [None if mask is None else lens.rectify_mask(mask) for mask in masks]
     segmenter = _segmenter(not named)
-    segmenter.forget()  # each call stands for itself
+    segmenter.forget_stream()  # each call stands for itself
     return segmenter.segment(detections, image, masks=masks)
 
 

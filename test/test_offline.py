@@ -495,7 +495,7 @@ def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
 def tied(place: np.ndarray, parent: str = "base", child: str = "camera") -> LineParams:
     """One frame at a place on another, by a tree of frames."""
     tree = FrameTree()
-    tree.receive(said(transform(parent, child, place)))
+    tree.add_transforms(said(transform(parent, child, place)))
     return LineParams(frames=tree)
 
 

@@ -116,7 +116,9 @@ def test_gravity_of_an_imu_is_turned_into_the_camera_and_one_of_an_unknown_mount
         gravity=np.array([0.0, 0.0, -1.0]), gravity_sigma_deg=1.0, stamp_ns=STAMP_NS, frame_id="imu"
     )  # fmt: skip
     match, noting, tree = depth_match(imu=(felt,)), NotingHost(), FrameTree()
-    tree.receive(said(transform("camera", "imu", pose(rotation_from_vector(np.array([np.pi / 2, 0, 0])), np.zeros(3)))))
+    tree.add_transforms(
+        said(transform("camera", "imu", pose(rotation_from_vector(np.array([np.pi / 2, 0, 0])), np.zeros(3))))
+    )
     pipeline = Pipeline(OneCloud(), SegmenterNodeParams(), tree, noting.host())
     frame = pipeline.segment(match, Cameras(match["camera_info"]), Raw()).frame
     np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-9)

@@ -53,7 +53,7 @@ class Adapter(NodeBase):
         """Take a constraint that was handed over out of the consumer's graph; False where that is not possible."""
         return False
 
-    def forget(self, key: Moments) -> None:
+    def forget_constraint(self, key: Moments) -> None:
         """A constraint no longer waits."""
 
     def is_in_flight(self, key: Moments) -> bool:
@@ -110,13 +110,13 @@ class Adapter(NodeBase):
         self.waiting[closure.moments] = closure
         while len(self.waiting) > self._params.most_waiting:
             oldest = next(key for key in self.waiting if not self.is_in_flight(key))
-            self.end(oldest, "queue_full", "its consumer is not there, or takes fewer than come")
+            self.drop_constraint(oldest, "queue_full", "its consumer is not there, or takes fewer than come")
 
     def _retract(self, name: str) -> None:
         key = self._keys.get(name)
         self._retracted += 1
         if key in self.waiting:
-            self.end(key, "retracted")
+            self.drop_constraint(key, "retracted")
             return
         if key is not None and self._taken.get(key, False):
             self._withdraw(key)
@@ -147,7 +147,7 @@ class Adapter(NodeBase):
             self._taken[key] = True
         return done
 
-    def settle(self, key: Moments) -> None:
+    def note_delivered(self, key: Moments) -> None:
         """The consumer has a constraint that was in flight, which may have been withdrawn meanwhile."""
         closure = self.waiting.get(key)
         if closure is None:
@@ -157,7 +157,7 @@ class Adapter(NodeBase):
         self._taken[key] = True
         self.conclude(closure.to_ns, lambda: True)
 
-    def end(self, key: Moments, reason: str, text: str = "") -> None:
+    def drop_constraint(self, key: Moments, reason: str, text: str = "") -> None:
         """Drop a constraint that waits."""
         closure = self.waiting[key]
         self._leave(key)
@@ -165,7 +165,7 @@ class Adapter(NodeBase):
 
     def _leave(self, key: Moments) -> None:
         self.waiting.pop(key, None)
-        self.forget(key)
+        self.forget_constraint(key)
 
     def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """What came more than once, and what was withdrawn."""

@@ -69,7 +69,7 @@ class ToG2o(Adapter):
         self._maps += 1
         self._graph = self._empty()
         for key in list(self.waiting):
-            self.end(key, anew.value)
+            self.drop_constraint(key, anew.value)
 
     def hand_over(self, closure: LoopClosure) -> bool:
         """An edge between the two nearest vertices, once odometry covers both keyframes."""

@@ -79,7 +79,7 @@ class ToRtabmap(Adapter):
         self._odometry = SparseTrajectory()
 
     def _on_map(self, message: Any) -> None:
-        is_other = self.read_aside("mapData", self._nodes.receive, message)
+        is_other = self.read_aside("mapData", self._nodes.add_map_data, message)
         if is_other:
             self._databases += 1
             self._want_graph()
@@ -101,7 +101,7 @@ class ToRtabmap(Adapter):
 
     def _await_rtabmap(self) -> None:
         """It may come back with another database, so nothing that is known of its nodes holds."""
-        self._nodes.forget()
+        self._nodes.clear()
         self._since.clear()
         self._want_graph()
 
@@ -174,7 +174,7 @@ class ToRtabmap(Adapter):
             return
         self._asked = None
         if future.exception() is None:
-            self.settle(asked.key)
+            self.note_delivered(asked.key)
         else:
             self._end_hopeless(asked.key)
 
@@ -188,13 +188,13 @@ class ToRtabmap(Adapter):
     def _end_hopeless(self, key: Moments) -> None:
         """Never ask again what was asked too often."""
         if key in self.waiting and self._attempts[key] >= self._limits.most_attempts:
-            self.end(key, "unanswered", f"add_link was asked {self._attempts[key]} times")
+            self.drop_constraint(key, "unanswered", f"add_link was asked {self._attempts[key]} times")
 
     def is_in_flight(self, key: Moments) -> bool:
         """Whether RTAB-Map was asked and has not answered."""
         return self._asked is not None and self._asked.key == key
 
-    def forget(self, key: Moments) -> None:
+    def forget_constraint(self, key: Moments) -> None:
         """Its patience and its attempts are over."""
         self._since.pop(key, None)
         self._attempts.pop(key, None)

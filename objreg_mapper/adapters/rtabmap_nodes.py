@@ -42,7 +42,7 @@ class RtabmapNodes:
     def __len__(self) -> int:
         return len(self._nodes)
 
-    def receive(self, message: Any) -> bool:
+    def add_map_data(self, message: Any) -> bool:
         """Take the nodes of a MapData in; True if they are of another database, and the old ones are forgotten.
 
         Nodes without odometry and intermediate ones, which no link may name, are left out. ValueError for too many, and
@@ -51,12 +51,12 @@ class RtabmapNodes:
         nodes = [_node(one) for one in message.nodes if one.id > 0 and one.weight >= 0 and _has_pose(one)]
         is_other = any(self._contradicts(node) for node in nodes)
         if is_other:
-            self.forget()
+            self.clear()
         for node in nodes:
             self._add(node)
         return is_other
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Know of none any more."""
         self._nodes.clear()
         self._order.clear()

@@ -126,11 +126,11 @@ class IncrementalGraph:
         for k, T in enumerate(poses, self.count):
             self._tree.waiting.values.insert(k, self._gtsam.Pose3(T))
         self._settled = np.concatenate([self._settled, poses])
-        numbers = self.add(edges)
+        numbers = self.add_edges(edges)
         self.remove(gone)
         return numbers
 
-    def add(self, edges: Edges) -> list[int]:
+    def add_edges(self, edges: Edges) -> list[int]:
         """Tie nodes that are there."""
         first = len(self._edges)
         for factor in self._factors(edges):
@@ -152,7 +152,7 @@ class IncrementalGraph:
             self._tree.waiting.gone.append(self._tree.places[number])
             self._edges[number] = None
 
-    def settle(self) -> Array:
+    def solve_poses(self) -> Array:
         """(n, 4, 4): where the nodes are with all that waits. What moves far is linearised anew, until little does."""
         relinearised = self.count
         for _ in range(MOST_UPDATES):

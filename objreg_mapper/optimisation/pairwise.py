@@ -35,7 +35,7 @@ class Agreement:
         self._ties: list[Tie] = []
         self._agree = np.zeros((0, 0), bool)
 
-    def add(self, number: int, tie: Tie, chains: tuple[Chain, Chain]) -> None:
+    def add_tie(self, number: int, tie: Tie, chains: tuple[Chain, Chain]) -> None:
         """Take in one more; chains are those of the sessions of its two ends."""
         count, first = len(self._ties), max(len(self._ties) - MOST_PAIRS, 0)
         grown = np.ones((count + 1, count + 1), bool)  # what is not compared does not disagree
@@ -67,7 +67,7 @@ class PairwiseConsistency:
             tie = in_order(ties[number])
             ends = tie.end1.session, tie.end2.session
             of_ends = chains[ends[0]], chains[ends[1]]
-            self._agreements.setdefault(ends, Agreement()).add(number, tie, of_ends)
+            self._agreements.setdefault(ends, Agreement()).add_tie(number, tie, of_ends)
         self._taken = len(ties)
         return frozenset(number for one in self._agreements.values() for number in one.outside())
 

@@ -131,7 +131,7 @@ class RobustGraph:
         self.closures, self._apart = belief.closures, belief.apart
         self._expected, self._withdrawn = belief.expected, belief.withdrawn
         graph, factors = self._state.graph, np.full(len(belief.closures), -1)
-        factors[belief.kept] = graph.add(belief.closures.taken(belief.kept))
+        factors[belief.kept] = graph.add_edges(belief.closures.taken(belief.kept))
         self._state = self._sorted_out(self._weighed(graph, factors))
 
     def close(self, closure: Edges, apart: Edges | None = None) -> None:
@@ -162,7 +162,7 @@ class RobustGraph:
     def _welcome(self, closure: Edges) -> None:
         """Believe the newest closure, which is expected to fit: nothing is tried on a copy, as for those in doubt."""
         without, factors = self._state, self._state.factors.copy()
-        factors[-1:] = without.graph.add(closure)
+        factors[-1:] = without.graph.add_edges(closure)
         self._state = self._weighed(without.graph, factors)
         if not self._state.cost <= without.cost:
             self._state = self._changed(self._state, [], [len(factors) - 1])
@@ -280,13 +280,13 @@ class RobustGraph:
                 graph.remove(factors[out].tolist())
                 factors[out] = -1
             if into:
-                factors[into] = graph.add(self.closures.taken(np.array(into)))
+                factors[into] = graph.add_edges(self.closures.taken(np.array(into)))
             return self._weighed(graph, factors)
         except (RuntimeError, ValueError):
             return replace(state, cost=np.inf)
 
     def _weighed(self, graph: IncrementalGraph, factors: Array) -> _State:
-        poses = graph.settle()
+        poses = graph.solve_poses()
         held, apart = squared_residuals(poses, self.closures), squared_residuals(poses, self._apart)
         residuals = np.where(factors >= 0, held, apart)
         cost = squared_residuals(poses, self.steps).sum() + np.where(factors >= 0, residuals, self.limit).sum()

@@ -52,7 +52,7 @@ class DetectorNode(NodeBase):
             self.pass_on(topic)
         self.listen_to_first("image", IMAGES, self._decode, self._receive, self.sensor())
 
-    def adopt(self) -> None:
+    def apply_parameters(self) -> None:
         """Live parameters hold from the next image on."""
         self._detector.params = self.settings.of(DetectorParams)
 
@@ -65,7 +65,7 @@ class DetectorNode(NodeBase):
         if not self.let_in(stamp_ns):
             return
         if self._rate_limit.admits(stamp_ns):
-            self._order.begin(stamp_ns)
+            self._order.begin_frame(stamp_ns)
             self.worker.put((stamp_ns, message))
         else:
             self._order.put_off(stamp_ns, message.header.frame_id)
@@ -80,11 +80,11 @@ class DetectorNode(NodeBase):
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
         """As any node; those behind it have their turn."""
         super().conclude(stamp_ns, work)
-        self._order.end(stamp_ns)
+        self._order.end_frame(stamp_ns)
 
     def _overtaken(self, job: tuple[int, Any]) -> None:
         super()._overtaken(job)
-        self._order.end(job[0])
+        self._order.end_frame(job[0])
 
     def compute(self, stamp_ns: int, payload: Any) -> bool:
         """One image."""

@@ -22,7 +22,7 @@ class Columns:
     def __init__(self, body: bytes) -> None:
         self._body, self._at = body, 0
 
-    def take(self, count: int) -> Array:
+    def next_column(self, count: int) -> Array:
         """The next column, (count,) int64."""
         width = self._body[self._at]
         end = self._at + 1 + width * count

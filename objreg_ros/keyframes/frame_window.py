@@ -21,7 +21,7 @@ class SessionNumbers:
     def __init__(self, first: int = 0) -> None:
         self.next, self._lock = first, threading.Lock()
 
-    def take(self) -> int:
+    def next_number(self) -> int:
         """A number that nothing has yet."""
         with self._lock:
             number, self.next = self.next, self.next + 1

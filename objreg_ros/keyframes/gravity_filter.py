@@ -46,7 +46,7 @@ class GravityFilter:
             return None, 0.0
         return T_session_camera[:3, :3].T @ falls / weight, min(1.0, weight)
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin again: nothing carries over to where the camera is now."""
         self._gravity_sum, self._path = np.zeros(3), None
 

@@ -47,7 +47,7 @@ class JitterMeter:
         self._pairs: deque[tuple[float, ...]] = deque(maxlen=MOST_PAIRS)
         self.jitter = STEADY
 
-    def add(self, differences: Array, explained: Array, ends: Array) -> None:
+    def add_differences(self, differences: Array, explained: Array, ends: Array) -> None:
         """Take in differences (N, 2) of sure poses, degrees and m, of whose squares so much is ``explained (N, 2)``.
 
         ``ends (N,)`` are the poses of odometry between each two; those between which there is none measure nothing.

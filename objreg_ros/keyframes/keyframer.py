@@ -61,9 +61,9 @@ class _Session:
     def lose(self, seconds: float, max_speed: float) -> None:
         """After a long silence neither the path so far nor the direction of gravity is known."""
         self.path.lose(seconds, max_speed)
-        self.gravity_filter.forget()
+        self.gravity_filter.reset()
 
-    def follow(self, frame: Frame) -> None:
+    def follow_frame(self, frame: Frame) -> None:
         """Go on to a frame."""
         self.last_ns = frame.stamp_ns
         if frame.T_odom_camera is not None:
@@ -104,7 +104,7 @@ class _Open:
 
 
 class Keyframer:
-    """Collects frames into frame windows. ``add`` returns the frame window that a frame ended, or None.
+    """Collects frames into frame windows. ``add_frame`` returns the frame window that a frame ended, or None.
 
     ``numbers`` gives each session its number; keyframers that share it have none in common.
     """
@@ -130,7 +130,7 @@ class Keyframer:
         window = self._open
         return None if window is None else (window.session.number, window.T_session_first @ window.T_first_last)
 
-    def add(self, frame: Frame) -> FrameWindow | None:
+    def add_frame(self, frame: Frame) -> FrameWindow | None:
         """Track the frame and collect it. A lost track, odometry that leaps or a clock that does begins a new session.
         One that is not later than the last, but by no jump, is passed over.
         """
@@ -151,7 +151,7 @@ class Keyframer:
         ended = self._end() if silent_s > SILENCE_S or self._is_over(frame, T_session_frame) else None
         if silent_s > SILENCE_S:
             session.lose(silent_s, self.params.max_speed)
-        session.follow(frame)
+        session.follow_frame(frame)
         frame = _with_session_gravity(session, frame)
         if self._open is None:
             self._begin(session, frame, T_session_frame)
@@ -159,7 +159,7 @@ class Keyframer:
             self._collect(self._open, frame, inverse(self._open.T_session_first) @ T_session_frame)
         return ended
 
-    def finish(self) -> FrameWindow | None:
+    def finish_window(self) -> FrameWindow | None:
         """End the frame window that is being collected: None if there is none or it shows nothing new.
 
         The session goes on with the next frame where odometry says where that is; else it begins another.
@@ -168,7 +168,7 @@ class Keyframer:
 
     def _start(self, frame: Frame) -> FrameWindow | None:
         """End what is being collected, and start another session with this frame."""
-        ended, number = self._end(), self._numbers.take()
+        ended, number = self._end(), self._numbers.next_number()
         self._clock = self._clock or Clock(frame.stamp_ns, number)
         T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
         self._session = _Session(
@@ -181,9 +181,9 @@ class Keyframer:
             last_ns=frame.stamp_ns,
             T_odom_first=T_session_frame,
         )
-        self._session.follow(frame)
+        self._session.follow_frame(frame)
         if not self._session.in_odometry:
-            self._last_picture.begin(frame.view)
+            self._last_picture.set_first(frame.view)
         self._begin(self._session, _with_session_gravity(self._session, frame), T_session_frame)
         return ended
 

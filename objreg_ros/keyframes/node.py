@@ -62,7 +62,7 @@ class KeyframerNode(FramesNode):
         self.create_timer(LOOK_S, self._end_what_rests, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.listen_to_frames(inputs.mounting, inputs.odom_slop)
 
-    def adopt(self) -> None:
+    def apply_parameters(self) -> None:
         """Live parameters hold from the next frame on."""
         self._keyframer.params = self.settings.of(KeyframeParams)
 
@@ -70,7 +70,7 @@ class KeyframerNode(FramesNode):
         """Follow one frame; what becomes a keyframe goes on to be sent."""
         frame, _ = self.frame_of(payload)
         with self._tracking, self.accounting.timed("track"):
-            window = self._keyframer.add(frame)
+            window = self._keyframer.add_frame(frame)
             self._seen_s = time.monotonic()
         if window is not None:
             self._sender.put((stamp_ns, window))
@@ -81,7 +81,7 @@ class KeyframerNode(FramesNode):
         with self._tracking:
             if time.monotonic() - self._seen_s < SILENCE_S:
                 return
-            self._seen_s, window = math.inf, self._keyframer.finish()
+            self._seen_s, window = math.inf, self._keyframer.finish_window()
         if window is not None:
             stamp_ns = window.frames[-1].stamp_ns
             self.accept(stamp_ns)
@@ -117,7 +117,7 @@ class KeyframerNode(FramesNode):
         self.end_work()
         self._sender.drain()
         self._sender.close()
-        window = self._keyframer.finish()
+        window = self._keyframer.finish_window()
         if window is not None:
             self._publish(window)
 

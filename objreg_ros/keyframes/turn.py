@@ -88,7 +88,7 @@ class LastPicture:
     def __init__(self) -> None:
         self._pictures: tuple[SmallPicture, ...] = ()
 
-    def begin(self, view: View) -> None:
+    def set_first(self, view: View) -> None:
         """Take the first frame."""
         self._pictures = small_pictures(view)
 

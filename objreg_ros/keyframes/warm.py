@@ -23,8 +23,8 @@ def warm(params: KeyframeParams) -> None:
     for T_odom_camera in (None, np.eye(4)):
         keyframer = Keyframer(params)
         for stamp_ns in (0, 1):
-            keyframer.add(replace(drawn(stamp_ns), T_odom_camera=T_odom_camera))
-        window = keyframer.finish()
+            keyframer.add_frame(replace(drawn(stamp_ns), T_odom_camera=T_odom_camera))
+        window = keyframer.finish_window()
         if window is not None:
             fuse(window, params)
 

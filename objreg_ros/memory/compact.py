@@ -145,12 +145,12 @@ def _view(head: Head, columns: Columns) -> View:
     camera = camera_of(head["camera"])
     shape = camera.height, camera.width
     pixels = within("pixels of a view", shape[0] * shape[1], limits.MOST_VIEW_PIXELS)
-    known = np.cumsum(columns.take(pixels)) > 0
+    known = np.cumsum(columns.next_column(pixels)) > 0
     depth = np.full(pixels, np.nan, np.float32)
-    depth[known] = np.maximum(quantised.depth_of(np.cumsum(columns.take(int(known.sum())))), limits.LEAST_RANGE)
+    depth[known] = np.maximum(quantised.depth_of(np.cumsum(columns.next_column(int(known.sum())))), limits.LEAST_RANGE)
     grey = None
     if whole(head, "grey", 0, 1):
-        grey = quantised.grey_of(np.cumsum(np.cumsum(columns.take(pixels).reshape(shape), axis=0), axis=1))
+        grey = quantised.grey_of(np.cumsum(np.cumsum(columns.next_column(pixels).reshape(shape), axis=0), axis=1))
     xyz = back_project(depth.reshape(shape), camera.fx, camera.fy, camera.cx, camera.cy)
     return View(xyz=xyz, grey=grey, intrinsics=camera)
 
@@ -181,7 +181,7 @@ def _objects(heads: Sequence[Head], columns: Columns) -> tuple[KeyObject, ...]:
     xyz, normals = _oriented(columns, total, steps_um[:, None])
     if (nearest := float(xyz[:, 2].min())) < limits.LEAST_RANGE:
         raise ValueError(f"expected objects {limits.LEAST_RANGE} m before the camera or farther, got {nearest:g} m")
-    flags = columns.take(total).astype(np.uint16)
+    flags = columns.next_column(total).astype(np.uint16)
     ends = np.cumsum(counts)[:-1]
     parts = zip(heads, *(np.split(array, ends) for array in (xyz, normals, flags)), strict=True)
     return tuple(_object(head, columns, xyz=part[0], normals=part[1], flags=part[2]) for head, *part in parts)
@@ -195,7 +195,7 @@ def _object(head: Head, columns: Columns, *, xyz: Array, normals: Array, flags: 
         instance=whole(head, "instance", 0, MOST_WHOLE),
         xyz=xyz,
         normals=normals,
-        rgb=quantised.rgb_of(columns.take(3 * len(xyz)).reshape(3, -1).T) if coloured else None,
+        rgb=quantised.rgb_of(columns.next_column(3 * len(xyz)).reshape(3, -1).T) if coloured else None,
         flags=flags,
         density=real(head, "density", limits.MOST_DENSITY),
     )
@@ -208,8 +208,8 @@ def _oriented_columns(steps: Array, normals: Array) -> list[bytes]:
 
 def _oriented(columns: Columns, count: int, each_um: Array | int) -> tuple[Array, Array]:
     """Points (N, 3) and normals (N, 3), both float32."""
-    steps = np.cumsum(columns.take(3 * count).reshape(3, count), axis=1).T
-    return quantised.points_of(steps, each_um), quantised.normals_of(columns.take(2 * count).reshape(2, count).T)
+    steps = np.cumsum(columns.next_column(3 * count).reshape(3, count), axis=1).T
+    return quantised.points_of(steps, each_um), quantised.normals_of(columns.next_column(2 * count).reshape(2, count).T)
 
 
 def within(name: str, number: Any, most: int, least: int = 0) -> int:

@@ -82,7 +82,7 @@ class Landmarks:
         self._there: defaultdict[Cell, set[int]] = defaultdict(set)
         self._shown: dict[int, array[int]] = {}  # the landmarks of each keyframe
         self._next = first
-        self.add(sightings)
+        self.add_sightings(sightings)
 
     def __len__(self) -> int:
         return len(self._known)
@@ -137,7 +137,7 @@ class Landmarks:
             touched |= two
         return merged
 
-    def add(self, sightings: Iterable[Sighting], merged: Mapping[int, Merge] | None = None) -> None:
+    def add_sightings(self, sightings: Iterable[Sighting], merged: Mapping[int, Merge] | None = None) -> None:
         """Take in sightings that have their landmarks, after merging the landmarks that turned out to be one."""
         for old, merge in (merged or {}).items():
             self._merge(old, merge)
@@ -158,7 +158,7 @@ class Landmarks:
     def passing(self, sightings: Iterable[Sighting]) -> Iterator[Sighting]:
         """The sightings as they come, each taken in on its way to what else needs it: a store is read but once."""
         for sighting in sightings:
-            self.add((sighting,))
+            self.add_sightings((sighting,))
             yield sighting
 
     def surplus(self, landmarks: Iterable[int]) -> list[int]:
@@ -171,7 +171,7 @@ class Landmarks:
         spared = set().union(*spare.values()) if spare else set()
         return sorted(k for k in spared if all(k in spare.get(number, ()) for number in self._shown.get(k, ())))
 
-    def forget(self, keyframe_ids: Iterable[int]) -> None:
+    def forget_keyframes(self, keyframe_ids: Iterable[int]) -> None:
         """Forget from where these keyframes saw their objects, and the landmarks that no other keyframe shows."""
         for keyframe_id in keyframe_ids:
             for number in self._shown.pop(keyframe_id, ()):

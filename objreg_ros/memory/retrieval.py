@@ -64,7 +64,7 @@ class Index:
     def __len__(self) -> int:
         return sum(map(len, self._blocks.values()))
 
-    def add(self, sightings: Iterable[Sighting]) -> None:
+    def add_objects(self, sightings: Iterable[Sighting]) -> None:
         """Add the objects of keyframes. Sessions in which the same landmark was seen have met."""
         first_session: dict[int, int] = {}
         for sighting in sightings:

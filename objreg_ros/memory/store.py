@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the registrar remembers, in one SQLite file: keyframes, their objects and closures.
 
-What `Store.add` has returned from is on the disk: the file is in WAL mode with full synchronisation, and a keyframe
-with its objects and closures is one transaction, so a process that is killed at any time leaves whole keyframes. The
-log is folded into the file after each of them, so that nothing hangs on the log alone. What is read was written: every
-row has a checksum of all its columns, and the `counters` say how many there are. Memory is bounded: only the
-last keyframes that were used stay decoded. So is the file: free space goes back to the disk.
+What `Store.write_keyframe` has returned from is on the disk: the file is in WAL mode with full synchronisation,
+and a keyframe with its objects and closures is one transaction, so a process that is killed at any time leaves whole
+keyframes. The log is folded into the file after each of them, so that nothing hangs on the log alone. What is read was
+written: every row has a checksum of all its columns, and the `counters` say how many there are. Memory is bounded: only
+the last keyframes that were used stay decoded. So is the file: free space goes back to the disk.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Store:
                 self._heads[row["id"]] = {name: row[name] for name in HEAD}
             undo.pop_all()
 
-    def add(
+    def write_keyframe(
         self,
         keyframe: Keyframe,
         sightings: Sequence[Sighting],
@@ -104,7 +104,7 @@ class Store:
         self._recent.keep(keyframe)
 
     def add_closure(self, closure: LoopClosure, merged: Mapping[int, Merge]) -> None:
-        """Write a closure of keyframes that are stored already; ``merged`` and StoreError as in `add`."""
+        """Write a closure of keyframes that are stored already; ``merged`` and StoreError as in `write_keyframe`."""
         with self._reporting("write a closure"), self._changing() as (transaction, counters):
             write_closures(transaction, counters, (closure,), MOST_CLOSURES)
             rename_landmarks(transaction, merged)

@@ -47,7 +47,7 @@ class Span(NamedTuple):
 
 
 class CornerTracks:
-    """Follows the corners of one stream. `add` returns the span that a view ended, mostly None."""
+    """Follows the corners of one stream. `track_view` returns the span that a view ended, mostly None."""
 
     def __init__(self) -> None:
         self._grey: Array | None = None  # of the last view
@@ -57,7 +57,7 @@ class CornerTracks:
         self._first_ns, self._count = 0, 0
         self._span: tuple[Span, Array] | None = None  # as it would end now, with the grey of its last view
 
-    def add(self, stamp_ns: int, view: View) -> Span | None:
+    def track_view(self, stamp_ns: int, view: View) -> Span | None:
         """Follow the corners into the next view. A view without grey is passed over."""
         if view.grey is None:
             return None

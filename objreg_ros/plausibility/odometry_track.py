@@ -36,7 +36,7 @@ class OdometryTrack:
             raise ValueError("expected samples of odometry, got none")
         return self._stamps[0], self._stamps[-1]
 
-    def add(self, sample: Odometry) -> None:
+    def add_odometry(self, sample: Odometry) -> None:
         """Take one sample in."""
         if self._stamps and sample.stamp_ns < self._stamps[-1]:
             self._stamps.clear()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the stream of one camera shows of itself while it runs, beside what it says.
 
-`follow` takes every view, `take_odometry` every sample of odometry. What does not fit is in `findings`. While the
+`follow_view` takes every view, `take_odometry` every sample of odometry. What does not fit is in `findings`. While the
 camera is not what it says, `doubt` says why: no closure is to be made then. Odometry that is not this camera's is
 `disowned`, and a mount that nobody knows is measured (`T_body_camera`).
 """
@@ -92,9 +92,9 @@ class StreamMonitor:
         """A sample of odometry, whether or not a frame comes by it."""
         if self._last_ns is not None and self._ahead_s is None:
             self._ahead_s = 1e-9 * (sample.stamp_ns - self._last_ns)
-        self._odometry.add(sample)
+        self._odometry.add_odometry(sample)
 
-    def follow(
+    def follow_view(
         self, stamp_ns: int, view: View, camera_frame: str, mount: Array | None, has_odometry: bool = False
     ) -> None:
         """The next view. ``mount`` is what is known of ``T_body_camera``, None where nothing says it."""
@@ -106,7 +106,7 @@ class StreamMonitor:
         self._last_ns, self._frames = stamp_ns, (self._odometry.child_frame_id, camera_frame)
         self.frames, self.with_odometry = self.frames + 1, self.with_odometry + has_odometry
         self._remember(stamp_ns, mount)
-        span = self._corners.add(stamp_ns, view)
+        span = self._corners.track_view(stamp_ns, view)
         if span is not None:
             mounts = self._mounts.get(span.first_ns), self._mounts.get(span.last_ns)
             self._legs.append(_Leg(span, None if mounts[0] is None or mounts[1] is None else (mounts[0], mounts[1])))
@@ -114,7 +114,7 @@ class StreamMonitor:
             if self._spans <= OFTEN or self._spans % SELDOM == 0:
                 self._judge()
 
-    def finish(self) -> None:
+    def judge_rest(self) -> None:
         """Judge what has come by the end of a recording."""
         if self.camera is not None and self._legs:
             self._judge(is_last=True)

@@ -48,7 +48,7 @@ class CameraTrack:
         self.sessions: set[int] = set()  # of the run of the clock
         self.newest_ns, self.newest_id = 0, 0
 
-    def begin(self, clock: Clock, hidden: frozenset[int], params: RegistrarParams) -> None:
+    def begin_run(self, clock: Clock, hidden: frozenset[int], params: RegistrarParams) -> None:
         """Another run of the clock goes on from now."""
         self.clock, self.hidden, self.sessions = clock, hidden, set()
         self.thinning = Thinning(params.thin_seconds)
@@ -91,12 +91,12 @@ class CameraTrack:
         waited, self.unproven = self.unproven, []
         return Outcome(closures=tuple(self._late(waiting, recollection) for waiting in waited))
 
-    def settle(self, now_ns: int | None, recollection: Recollection) -> Outcome:
+    def settle_waiting(self, now_ns: int | None, recollection: Recollection) -> Outcome:
         """What waits no more: late constraints, which are written down, and refusals; all where there is no now.
 
         Nothing is published, and what is confirmed waits on, while the camera is not proven.
         """
-        confirmed, refused = self.confirmation.settle(now_ns)
+        confirmed, refused = self.confirmation.decide_waiting(now_ns)
         closures = list(self._released(recollection).closures) if self.proven else []
         for waiting in confirmed:
             pair = waiting.from_session, waiting.closure.from_ns, waiting.closure.to_ns
@@ -114,7 +114,7 @@ class CameraTrack:
         """A constraint that waited, written down."""
         settled, ends = recollection.remember_late(waiting)
         if ends is not None:
-            self.relocalisation.receive(settled.closure, *ends)
+            self.relocalisation.add_closure(settled.closure, *ends)
         return settled.closure
 
 
@@ -141,7 +141,7 @@ class CameraTracks(dict[Camera, CameraTrack]):
                 del self[next(oldest for oldest, track in tuple(self.items()) if track is not self.followed)]
         return self[camera]
 
-    def follow(self, frame: Frame) -> CameraTrack:
+    def track_of(self, frame: Frame) -> CameraTrack:
         """That of the camera of a frame, which is the newest."""
         self.followed = self.of((frame.robot, frame.frame_id))
         return self.followed
@@ -151,9 +151,9 @@ class CameraTracks(dict[Camera, CameraTrack]):
         refusal = Reason.CAMERA, doubt
         return Outcome(rejected=(*self.of(window.camera).give_up(refusal), refused_window(window, refusal)))
 
-    def end(self) -> list[FrameWindow]:
+    def finish_windows(self) -> list[FrameWindow]:
         """The frame windows that were being collected, without those that show nothing new."""
-        ended = [track.keyframer.finish() for track in self.all()]
+        ended = [track.keyframer.finish_window() for track in self.all()]
         return [window for window in ended if window is not None]
 
     def go_on(self, keyframe: Keyframe, clock: Clock, recollection: Recollection) -> tuple[Rejected, ...]:
@@ -167,7 +167,7 @@ class CameraTracks(dict[Camera, CameraTrack]):
         if clock != track.clock:
             hidden = self.hidden_from(clock, keyframe.camera, recollection.store)
             given_up = track.give_up() + clock_refusals(clock, hidden, keyframe)
-            track.begin(clock, hidden, recollection.params)
+            track.begin_run(clock, hidden, recollection.params)
         self._show_beside(track, keyframe)
         track.see(keyframe)
         return given_up

@@ -64,7 +64,7 @@ class Confirmation:
         if not self._wait_ns:
             return decision
         by_odometry = source.by_odometry and target.by_odometry
-        number = self._consistency.add(_statement(source, target, candidate, accepted, by_odometry))
+        number = self._consistency.add_statement(_statement(source, target, candidate, accepted, by_odometry))
         support = self._consistency.support(number)
         if accepted:  # where our own tracking slipped, right poses contradict each other
             waits = by_odometry and _opposed(support)
@@ -79,7 +79,7 @@ class Confirmation:
         """Let a held pose wait, with what its constraint needs once the keyframes are gone."""
         self._waiting[number] = waiting
 
-    def settle(self, now_ns: int | None) -> tuple[list[WaitingClosure], list[Rejected]]:
+    def decide_waiting(self, now_ns: int | None) -> tuple[list[WaitingClosure], list[Rejected]]:
         """What waits no more at the end of a keyframe: what is confirmed, and what is refused for good.
 
         All of it where ``now_ns`` is None.

@@ -110,7 +110,7 @@ class Consistency:
         """Of odometry, as measured until now."""
         return self._meter.jitter
 
-    def add(self, statement: Statement) -> int:
+    def add_statement(self, statement: Statement) -> int:
         """Take in a statement; its number. Forgets what no later one can concern any more."""
         self._forget(statement.source)
         number, self._next = self._next, self._next + 1
@@ -149,7 +149,9 @@ class Consistency:
         if near and _measures(one):
             sure, noise = [others[k] for k in near], tolerance(metres[near]) / TOLERANCE_SIGMAS
             explained = np.array([variances(other, one) for other in sure]) + np.square(noise)
-            self._meter.add(differences[near], explained, np.array([ends_between(other, one) for other in sure]))
+            self._meter.add_differences(
+                differences[near], explained, np.array([ends_between(other, one) for other in sure])
+            )
 
     def _clique(self, number: int) -> int:
         """How many others agree with a statement and each other, the surest first; 0 where none of them all is sure.

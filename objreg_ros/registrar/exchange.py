@@ -117,7 +117,7 @@ class Exchange:
         run = name_of(packed).run
         return run if run in self._peers else ""
 
-    def receive(self, packed: bytes, now: float = 0.0) -> bytes | None:
+    def receive_summary(self, packed: bytes, now: float = 0.0) -> bytes | None:
         """A request for the keyframe of a summary, where it may show a place that is stored here; else None.
 
         ValueError where the bytes are no summary.
@@ -135,7 +135,7 @@ class Exchange:
             if not ours:
                 self.counters["dropped: unlike"] += 1
                 return None
-            if not self._pending.add(KeyframeRequest(summary, ours, now)):
+            if not self._pending.add_request(KeyframeRequest(summary, ours, now)):
                 return None
             return self._sent("requests", pack_request(Request(summary.name, ours[0].votes, self.run)))
 
@@ -150,7 +150,7 @@ class Exchange:
         with self._lock:
             self.counters["requests received"] += 1
             asker = request.asker if request.asker in self._peers else ""
-            self._wishes.add(asker, request.name.keyframe_id, request.votes, now)
+            self._wishes.add_wish(asker, request.name.keyframe_id, request.votes, now)
 
     def answer(self, now: float) -> bytes | None:
         """The keyframe that promises most of those that one asker waits for; None if none does, or it has to wait.
@@ -173,7 +173,7 @@ class Exchange:
         with self._lock:
             return name in self._pending
 
-    def take(
+    def receive_delivery(
         self, packed: bytes, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
     ) -> Outcome | None:
         """What a keyframe that was asked for comes to, as `Registrar.search` has it; None for one that was not.
@@ -190,7 +190,7 @@ class Exchange:
         asked = self._answered(name, came)
         first, began = asked.summary.sightings[0], asked.summary.clock
         with self._lock:
-            self._pending.forget(asked)
+            self._pending.remove_request(asked)
             self._peers.prove(name.run)
             clock = Clock(began.began_ns, self._session_here(name.run, began.session))
             session = self._session_here(name.run, first.session)
@@ -241,7 +241,7 @@ class Exchange:
         """Take the next of those that wait; none while nothing may be sent."""
         with self._lock:
             self._wishes.expire(now)
-            return self._wishes.take(now) if self._allowance.some_left(now) else None
+            return self._wishes.next_wish(now) if self._allowance.some_left(now) else None
 
     def _ours(self, keyframe: Keyframe) -> Keyframe:
         """A stored keyframe as others get it, under the name of our robot."""

@@ -124,9 +124,9 @@ class RegistrarNode(FramesNode):
         jobs, patience_s = max(WAITING_KEYFRAMES, 2 * BEHIND * len(lanes)), math.inf if self._robots else PATIENCE_S
         return Limit(jobs, WAITING_BYTES, patience_s, dict.fromkeys(lanes, BEHIND))
 
-    def adopt(self) -> None:
+    def apply_parameters(self) -> None:
         """Live parameters hold from the next frame and the next search on."""
-        self._registrar.adopt(self.settings.of(RegistrarParams))
+        self._registrar.use_parameters(self.settings.of(RegistrarParams))
         self._seconds = self.settings.of(RegistrarNodeParams).limit
 
     def _niceness(self) -> int:
@@ -188,9 +188,9 @@ class RegistrarNode(FramesNode):
         hurried = self.searcher.hurried
         if isinstance(seen, FromRobot):
             arrival = self.read("keyframes", arrival_of, seen.robot, seen.sent)
-            return self._registrar.receive(arrival, seconds, hurried)
+            return self._registrar.receive_keyframe(arrival, seconds, hurried)
         if isinstance(seen, Delivered):
-            return self._exchange.take(seen.packed, seconds, hurried)
+            return self._exchange.receive_delivery(seen.packed, seconds, hurried)
         outcome = self._registrar.search(seen, seconds, hurried)
         if self._robot and outcome.keyframe_ns is not None:
             self._others.send(outcome.keyframe_ns, self._exchange.announce(outcome))
@@ -205,7 +205,7 @@ class RegistrarNode(FramesNode):
             if outcome.keyframe_ns is not None:
                 seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
                 self._announcements.landmarks(*seen, self.names_of(outcome.robot), outcome.session, outcome.robot)
-                self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
+                self._scene.show_keyframe(outcome.keyframe_ns, outcome.closures, outcome.rejected)
                 objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
                 self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self.odom_frame))
 
@@ -267,7 +267,7 @@ class RegistrarNode(FramesNode):
         try:
             with self._tracking:
                 self.searcher.drain()
-                for window in self._registrar.end():
+                for window in self._registrar.end_windows():
                     self._publish(self._outcome(window, self._seconds) or Outcome())
                 self._publish(self._registrar.settle())
             return True, self._registrar.save()
@@ -289,7 +289,7 @@ class RegistrarNode(FramesNode):
     def _store_the_rest(self) -> None:
         """Store the keyframes that were not searched for; of those that cannot be the log says how many and why."""
         lost = list[str]()
-        for seen in (*(job.seen for job in self.searcher.rest()), *self._registrar.end()):
+        for seen in (*(job.seen for job in self.searcher.rest()), *self._registrar.end_windows()):
             try:
                 self._outcome(seen, 0.0)
             except Exception as error:  # whatever is wrong with one, the others are stored

@@ -44,7 +44,7 @@ class Origins:
 
     def _number(self, known: dict[int, int], there: int) -> int:
         if there not in known:
-            known[there] = self._numbers.take()
+            known[there] = self._numbers.next_number()
         return known[there]
 
 

@@ -25,7 +25,7 @@ class Recollection:
         self._params, self.store = params, store
         self.index = Index(params)
         self.landmarks = Landmarks(params, first=store.next_landmark())
-        self.index.add(self.landmarks.passing(store.sightings()))
+        self.index.add_objects(self.landmarks.passing(store.sightings()))
 
     @property
     def params(self) -> RegistrarParams:
@@ -46,9 +46,9 @@ class Recollection:
         ]
         named, merged = self.landmarks.assign(sightings, links)
         closures = tuple(closure_of(keyframe, named, decision, self.params) for decision in accepted)
-        self.store.add(keyframe, named, closures, merged)
-        self.landmarks.add(named, merged)
-        self.index.add(named)
+        self.store.write_keyframe(keyframe, named, closures, merged)
+        self.landmarks.add_sightings(named, merged)
+        self.index.add_objects(named)
         self._meet(keyframe, accepted)
         with suppress(StoreError):  # the keyframe is stored: what is left now goes another time
             self._forget_surplus(named)
@@ -96,7 +96,7 @@ class Recollection:
             pairs = [(here[a], there[b]) for a, b in waiting.pairs if a in here and b in there]
             merged = self.landmarks.joined(pairs, waiting.R_there_here)
             self.store.add_closure(waiting.closure, merged)
-            self.landmarks.add((), merged)
+            self.landmarks.add_sightings((), merged)
             joined = {old: merge.into for old, merge in merged.items()}
             seen = {a: here.get(a, there.get(b)) for a, b in waiting.pairs}
             names = {a: joined.get(one.landmark, one.landmark) for a, one in seen.items() if one is not None}
@@ -116,4 +116,4 @@ class Recollection:
         if spare:
             self.store.remove(spare, forgotten=len(beyond))
             self.index.remove(spare)
-            self.landmarks.forget(spare)
+            self.landmarks.forget_keyframes(spare)

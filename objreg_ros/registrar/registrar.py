@@ -3,7 +3,8 @@
 
 `Registrar.track` is the part for every frame, `Registrar.search` the part for every keyframe; they may run in two
 threads, each in one. `Registrar.process` is both in a row: the same frames always give the same closures. Frames of
-several robots and cameras may come in turn. `Registrar.receive` takes keyframes of machines that track by themselves.
+several robots and cameras may come in turn. `Registrar.receive_keyframe` takes keyframes of machines that track by
+themselves.
 """
 
 from __future__ import annotations
@@ -108,23 +109,25 @@ class Registrar:
 
     def finish(self, doubt: str = "") -> Outcome:
         """`search` for the keyframes that were being collected, `release` and `settle`: the end of a recording."""
-        outcomes = [self._tracks.refuse(window, doubt) if doubt else self.search(window) for window in self.end()]
+        outcomes = [
+            self._tracks.refuse(window, doubt) if doubt else self.search(window) for window in self.end_windows()
+        ]
         return in_turn(outcomes).with_late(self.release(doubt)).with_late(self.settle())
 
-    def end(self) -> list[FrameWindow]:
+    def end_windows(self) -> list[FrameWindow]:
         """The frame windows that were still being collected, one a camera, without those that show nothing new."""
-        return self._tracks.end()
+        return self._tracks.finish_windows()
 
-    def adopt(self, params: RegistrarParams) -> None:
+    def use_parameters(self, params: RegistrarParams) -> None:
         """Take what is live of the parameters, from the next frame and the next search on."""
         self._adopted = params
 
     def track(self, frame: Frame) -> FrameWindow | None:
         """Follow the camera; returns the frame window that became a keyframe with this one, mostly None."""
-        track = self._tracks.follow(frame)
+        track = self._tracks.track_of(frame)
         track.keyframer.params = self._adopted
-        window = track.keyframer.add(frame)
-        track.relocalisation.follow(frame, track.keyframer.session)
+        window = track.keyframer.add_frame(frame)
+        track.relocalisation.note_frame(frame, track.keyframer.session)
         return window
 
     def search(
@@ -148,7 +151,7 @@ class Registrar:
             keyframe = fuse(window, self.params)
             return self._close_loops(keyframe, window.clock, budget, window.proven) if keyframe.objects else Outcome()
 
-    def receive(
+    def receive_keyframe(
         self, arrival: Arrival, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
     ) -> Outcome | None:
         """`search` for a keyframe of a keyframer elsewhere, if it has objects; None for one that came before."""
@@ -179,7 +182,7 @@ class Registrar:
             session=keyframe.session,
             robot=keyframe.robot,
         )
-        return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
+        return outcome.with_late(track.settle_waiting(keyframe.stamp_ns, self._recollection))
 
     def _follow(self, keyframe: Keyframe, clock: Clock, track: CameraTrack, proven: bool) -> tuple[Rejected, ...]:
         """Go on to the keyframe; what is given up where the clock of its camera began anew."""
@@ -217,7 +220,7 @@ class Registrar:
                 track.thinning.withdraw(decision.target.session, decision.target.stamp_ns, keyframe.stamp_ns)
             raise
         for decision, closure in zip(believed, closures, strict=True):
-            track.relocalisation.receive(closure, keyframe, decision.target)
+            track.relocalisation.add_closure(closure, keyframe, decision.target)
         if not track.proven:
             track.wait_for_proof(found.accepted, keyframe, named)
         for decision in found.waiting:
@@ -243,7 +246,7 @@ class Registrar:
 
     def take_session(self) -> int:
         """A number for a session of a keyframe that others store, which no session here has."""
-        return self._numbers.take()
+        return self._numbers.next_number()
 
     def places(self, sightings: Sequence[Sighting], frame_id: str) -> list[CandidateKeyframe]:
         """What `compare` would try for a keyframe with these objects, the most promising first; may be empty.
@@ -282,12 +285,12 @@ class Registrar:
             for decision in found.waiting:
                 track.hold(decision, keyframe, self._recollection.as_known(keyframe, decision))
             outcome = Outcome(closures=closures, rejected=(*before, *found.refused), robot=keyframe.robot)
-            return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
+            return outcome.with_late(track.settle_waiting(keyframe.stamp_ns, self._recollection))
 
     def settle(self) -> Outcome:
         """Publish or refuse what still waits for other keyframes to confirm it: the end of a recording, or a save."""
         with self._lock:
-            return in_turn([track.settle(None, self._recollection) for track in self._tracks.all()])
+            return in_turn([track.settle_waiting(None, self._recollection) for track in self._tracks.all()])
 
     def release(self, doubt: str = "") -> Outcome:
         """Publish what waits for proof of a camera that is silent; refuse it if that is in ``doubt``."""

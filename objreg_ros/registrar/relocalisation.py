@@ -101,7 +101,7 @@ class Relocalisation:
         self._path_until_tie = 0.0
         self._agreeing, self._target_ns, self._by_odometry = 0, 0, False
 
-    def follow(self, frame: Frame, session: int) -> None:
+    def note_frame(self, frame: Frame, session: int) -> None:
         """Go on to a frame of this session."""
         with self._lock:
             silent_s = 1e-9 * (frame.stamp_ns - self._last_ns)
@@ -124,7 +124,7 @@ class Relocalisation:
         before = (metres for step_ns, metres in reversed(self._steps) if step_ns <= stamp_ns)
         return next(before, self._steps[0][1])
 
-    def receive(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
+    def add_closure(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
         """Take in a closure of these keyframes, the later one first; those of one session add nothing."""
         with self._lock:
             is_of_now = source.session == self._session and source.stamp_ns >= self._began_ns

@@ -144,7 +144,7 @@ class SegmenterNode(SynchronisedNode):
 
     def _on_camera(self, message: Any) -> None:
         self._camera_info = message
-        self.watch.forget("camera_info")  # once is enough
+        self.watch.unwatch("camera_info")  # once is enough
         self.feed("camera_info", headers.stamp_ns(message), message)
 
     def _receive_colour_camera(self, message: Any) -> None:
@@ -161,7 +161,7 @@ class SegmenterNode(SynchronisedNode):
 
     def _on_imu(self, message: Any) -> None:
         sample = self.read_aside("imu", motion_from_msg.imu, message)
-        felt = None if sample is None else self._pipeline.imu.receive(sample)
+        felt = None if sample is None else self._pipeline.imu.add_imu(sample)
         if felt is not None:
             self.feed("imu", felt.stamp_ns, felt)
 
@@ -198,10 +198,10 @@ class SegmenterNode(SynchronisedNode):
                 self.expect("camera_info", "camera_info")
         else:
             self.hang_up("image")  # a cloud brings its own colour
-            self.watch.forget("camera_info")  # and may do without a camera
+            self.watch.unwatch("camera_info")  # and may do without a camera
         self.get_logger().info(f"depth comes from {self.resolve_topic_name(topic)}")
         self._source = topic
-        self.begin(streams)
+        self.start_matching(streams)
 
     # Compute
 

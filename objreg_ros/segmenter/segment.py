@@ -64,11 +64,11 @@ class Segmenter:
             )
             self.segment(asked, image)
             warm_offset(image)
-        self.forget()
+        self.forget_stream()
 
-    def forget(self) -> None:
+    def forget_stream(self) -> None:
         """Begin with another stream: nothing is known of its sensor."""
-        self.sensor.forget()
+        self.sensor.forget_stream()
 
     def segment(
         self,

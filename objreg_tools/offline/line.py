@@ -65,7 +65,7 @@ class LineParams:
 
 
 class Line:
-    """Detector, segmenter and registrar, one after another. Give it messages in order of time, then `finish`.
+    """Detector, segmenter and registrar, one after another. Give it messages in order of time, then `flush`.
 
     With ``recorded`` the detector is not asked: what another one found comes as "detections", and as "label_info" the
     names of its numbers.
@@ -115,9 +115,9 @@ class Line:
         """One recorded message of an input; one that does not decode is counted as dropped."""
         message = self._kept(name, lambda: record.message)
         if message is not None:
-            self.take(name, message)
+            self.process_message(name, message)
 
-    def take(self, name: str, message: Any) -> None:
+    def process_message(self, name: str, message: Any) -> None:
         """One message of an input of the graph, or of "tf". One that breaks its contract is counted as dropped."""
         if name == "tf":
             self._take_tf(message)
@@ -147,10 +147,10 @@ class Line:
                 self._mount.nameless = self._pipeline.mount.nameless = body
                 self._stream.take_odometry(odometry)
                 self._feed(name, stamp_ns, odometry)
-                self._track(self._frames.add(name, stamp_ns, odometry))
+                self._track(self._frames.add_item(name, stamp_ns, odometry))
         elif name == "imu":
             sample = self._kept(name, partial(motion_from_msg.imu, message))
-            felt = None if sample is None else self._pipeline.imu.receive(sample)
+            felt = None if sample is None else self._pipeline.imu.add_imu(sample)
             if felt is not None:
                 self._feed(name, stamp_ns, felt)
 
@@ -159,13 +159,13 @@ class Line:
         self._kept("tf", partial(self._tree.receive_moving, message))
         reached_ns = self._mount.reached_ns
         if reached_ns is not None:
-            self._track(self._frames.add("joints", reached_ns, None))
+            self._track(self._frames.add_item("joints", reached_ns, None))
 
-    def finish(self) -> Run:
+    def flush(self) -> Run:
         """Let out what waits."""
         self._segment(self._views.flush())
         self._track(self._frames.flush())
-        self._note(self._stages.registrar.finish(self._stream.finish()))
+        self._note(self._stages.registrar.finish(self._stream.judge_rest()))
         self.run.findings, self.run.measured_mount = self._stream.findings, self._stream.mount
         sensor = self._stages.segmenter.sensor
         self.run.depth_to_colour = sensor.depth_to_colour.text()
@@ -194,7 +194,7 @@ class Line:
 
     def _feed(self, name: str, stamp_ns: int, payload: Any) -> None:
         if name in self._views.queues:
-            self._segment(self._views.add(name, stamp_ns, payload))
+            self._segment(self._views.add_item(name, stamp_ns, payload))
 
     def _segment(self, matches: Iterable[Match]) -> None:
         for match in matches:
@@ -213,7 +213,7 @@ class Line:
         self.run.note(made)
         frame = as_sent(made.frame)
         self._labels[frame.stamp_ns] = made.detections.label
-        self._track(self._frames.add("frame", frame.stamp_ns, frame))
+        self._track(self._frames.add_item("frame", frame.stamp_ns, frame))
 
     def _read_detections(self, match: Match, size: Size, size_of_picture: Size) -> Detections:
         """The boxes or masks of a match, read now where another detector recorded them."""
@@ -298,7 +298,7 @@ def run_offline(
             on_frame(line.run.frames + line.run.dropped[LEFT_OUT])
         if line.full:
             break
-    return line.finish()
+    return line.flush()
 
 
 def as_sent(frame: Frame) -> Frame:

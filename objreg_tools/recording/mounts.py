@@ -43,10 +43,10 @@ def frame_tree(recording: Recording, *followed: str) -> FrameTree:
     Of what is above the frames ``followed`` it is then known what moves.
     """
     tree, static = FrameTree(), static_topics(recording)
-    tree.follow(*followed)
+    tree.keep_history(*followed)
     for record in recording.records(static) if static else ():
         with suppress(ValueError):
-            tree.receive(record.message)
+            tree.add_transforms(record.message)
     for record in _glances(recording, moving_topics(recording)):
         with suppress(ValueError):
             tree.receive_moving(record.message)

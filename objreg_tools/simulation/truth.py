@@ -174,7 +174,7 @@ class TruthWriter:
         self._masks: list[tuple[str, bytes]] = []
         self._dtype = np.uint8 if max(_most(scene) for scene in plan.scenes) < 256 else np.uint16
 
-    def add(self, stamp_ns: int, scene: int, image: Rendering) -> None:
+    def write_frame(self, stamp_ns: int, scene: int, image: Rendering) -> None:
         """Take down one frame."""
         seen = [
             {"instance": o.instance, "xyxy": o.xyxy.tolist(), "visibility": round(o.visibility, 4), "pixels": o.pixels}

@@ -165,7 +165,7 @@ def write_plan(
     def records() -> Iterator[Record]:
         for k, image in enumerate(_rendered(plan, sown, sensors, rig, threads)):
             stamp_ns = START_NS + plan.start_ns + round(k * 1e9 / plan.rate)
-            truth.add(stamp_ns, int(plan.scene_of[k]), image)
+            truth.write_frame(stamp_ns, int(plan.scene_of[k]), image)
             odometry = messages.odometry(T_odom_camera[k], covariance[k], stamp_ns, odom, camera)
             yield from _camera_records(image, stamp_ns, camera, points, jpeg, rig)
             yield from _pose_records(image.T_world_camera, odometry, stamp_ns)
@@ -203,7 +203,7 @@ def _frame(plan: RecordingPlan, k: int, seed: int, sensors: Sensors, rig: Rig | 
     noise_seed = int(np.random.default_rng([seed, 41, k]).integers(2**31))
     of = (sensors.depth, sensors.colour, sensors.stress)
     if rig is not None:
-        return rig.take(scene, Motion(plan.T_world_camera, plan.rate), k / plan.rate, noise_seed, *of)
+        return rig.take_picture(scene, Motion(plan.T_world_camera, plan.rate), k / plan.rate, noise_seed, *of)
     return render(scene, plan.T_world_camera[k], sensors.intrinsics, noise_seed, *of)
 
 

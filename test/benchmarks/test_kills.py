@@ -55,7 +55,7 @@ def test_a_keyframe_that_was_announced_and_is_not_stored_is_lost(
     with closing(Store(tmp_path / "place.db")) as store:
         for number, seconds in enumerate(stored, start=1):
             written = keyframe(number, seconds)
-            store.add(written, sightings_of(written))
+            store.write_keyframe(written, sightings_of(written))
     count = kills.Count()
     kills.kill_once(Robot(), tmp_path, tmp_path / "place.db", 0.0, count)
     assert (count.kills, count.announced, count.lost, count.unreadable) == (1, 2, lost, [])

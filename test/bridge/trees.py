@@ -44,8 +44,8 @@ def said(*transforms: Any) -> Any:
 def panning(*degrees: float, step_ns: int = SECOND // 10, start_ns: int = SECOND) -> FrameTree:
     """A head on a base that turns over time, and a camera on the head."""
     tree = FrameTree()
-    tree.follow("eye")
-    tree.receive(said(transform("head", "eye", moved(1))))
+    tree.keep_history("eye")
+    tree.add_transforms(said(transform("head", "eye", moved(1))))
     for k, angle in enumerate(degrees):
         tree.receive_moving(said(transform("base", "head", turned(angle), start_ns + k * step_ns)))
     return tree

@@ -10,7 +10,9 @@ from objreg_ros.keyframes.frame_window import SessionNumbers
 
 def test_threads_that_share_numbers_get_none_twice() -> None:
     numbers, taken = SessionNumbers(7), list[int]()
-    threads = [threading.Thread(target=lambda: taken.extend(numbers.take() for _ in range(500))) for _ in range(4)]
+    threads = [
+        threading.Thread(target=lambda: taken.extend(numbers.next_number() for _ in range(500))) for _ in range(4)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:

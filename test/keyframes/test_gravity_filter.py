@@ -84,7 +84,7 @@ def test_a_camera_that_creeps_learns_as_one_that_strides() -> None:
 
 def test_what_is_forgotten_is_not_carried_on() -> None:
     gravity_filter, T = taught(20), camera(200.0)
-    gravity_filter.forget()
+    gravity_filter.reset()
     assert gravity_filter.update(T, T[:3, :3].T @ DOWN, 1.0)[1] == pytest.approx(ONE_VIEW)
     assert taught(20).update(T, T[:3, :3].T @ DOWN, 1.0)[1] > 0.5
 

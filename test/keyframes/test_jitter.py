@@ -20,7 +20,7 @@ def differences(rms: tuple[float, float], count: int = 400, seed: int = 0) -> Ar
 
 def measured(found: Array, explained: Array = NONE, ends: int = 4) -> Jitter:
     meter = JitterMeter()
-    meter.add(found, explained[: len(found)], np.full(len(found), ends))
+    meter.add_differences(found, explained[: len(found)], np.full(len(found), ends))
     return meter.jitter
 
 

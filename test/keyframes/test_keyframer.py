@@ -21,7 +21,7 @@ DOWN = np.array([0.0, 1.0, 0.0])  # of a camera that is level
 
 
 def _run(keyframer: Keyframer, frames: list[Frame]) -> list[FrameWindow]:
-    ended = [keyframer.add(item) for item in frames] + [keyframer.finish()]
+    ended = [keyframer.add_frame(item) for item in frames] + [keyframer.finish_window()]
     return [window for window in ended if window is not None]
 
 
@@ -64,7 +64,7 @@ def test_a_camera_that_turns_fast_is_followed_in_one_session() -> None:
     poses = [swung(angle) for angle in (0, 7, 14, 21, 14, 6)]
     keyframer = Keyframer(PARAMS)
     for i, T in enumerate(poses):
-        keyframer.add(frame(0.1 * i, CUP, None, scene_view(T)))
+        keyframer.add_frame(frame(0.1 * i, CUP, None, scene_view(T)))
         assert keyframer.tracked is not None and keyframer.tracked[0] == 0
         np.testing.assert_allclose(keyframer.tracked[1], T, atol=0.02)
 
@@ -80,7 +80,7 @@ def test_where_the_newest_frame_is_in_its_session_is_told() -> None:
     keyframer = Keyframer(PARAMS)
     assert keyframer.tracked is None
     for k in range(5):
-        keyframer.add(frame(0.1 * k, CUP, None, scene_view(moved(0.03 * k))))
+        keyframer.add_frame(frame(0.1 * k, CUP, None, scene_view(moved(0.03 * k))))
     assert keyframer.tracked is not None
     session, T_session_camera = keyframer.tracked
     assert session == 0 and np.allclose(T_session_camera, moved(0.12), atol=0.005)

@@ -101,7 +101,7 @@ def test_every_step_of_a_keyframe_has_a_bound_at_the_limits_of_a_frame(monkeypat
     registrar = Registrar(RegistrarParams(candidates=1))
     for seconds in (0.0, 10.0, 20.0):
         registrar.track(at_the_limits(seconds))
-        (window,) = registrar.end()
+        (window,) = registrar.end_windows()
         outcome = registrar.search(window, 0.0)
         stored = registrar._store.keyframe(outcome.keyframe_id)
         assert len(stored.objects) == own_size.OBJECTS

@@ -53,7 +53,7 @@ def test_a_fast_turn_is_told_from_a_slow_one() -> None:
 
 def test_two_places_are_no_turn() -> None:
     last = LastPicture()
-    last.begin(scene_view())
+    last.set_first(scene_view())
     noise = np.random.default_rng(1).integers(0, 255, (120, 160)).astype(np.uint8)
     checks = np.kron(noise[::20, ::20], np.ones((20, 20), np.uint8))
     assert last.next(replace(scene_view(), grey=checks)) == (None, False)
@@ -62,8 +62,8 @@ def test_two_places_are_no_turn() -> None:
 def test_without_grey_and_without_texture_nothing_is_fast() -> None:
     view = scene_view()
     last = LastPicture()
-    last.begin(replace(view, grey=None))
+    last.set_first(replace(view, grey=None))
     assert last.next(scene_view(turned(0, 8, 0))) == (None, False)
     flat: View = replace(view, grey=np.full_like(view.grey, 90))
-    last.begin(flat)
+    last.set_first(flat)
     assert not last.next(flat).is_fast

@@ -23,7 +23,7 @@ TRUE, PARAMS = square(), MapperParams()
 def session() -> Session:
     made = Session()
     for one in odometry(TRUE):
-        made.add(one, PARAMS)
+        made.add_pose(one, PARAMS)
     return made
 
 

@@ -22,7 +22,7 @@ def followed(graph: PoseGraph, robot: str, leaps: list[str] | None = None, frame
     follower = Follower(robot, 5.0, lambda: said.append(robot))
     for word in WALK[:20]:
         for admitted in follower.admit(replace(word, frame_id=frame_id)).poses:
-            follower.follow(admitted, graph)
+            follower.follow_pose(admitted, graph)
     return follower
 
 
@@ -51,7 +51,7 @@ def test_after_time_jumped_back_what_was_found_before_is_of_the_old_run() -> Non
     follower = followed(graph, "a")
     assert not follower.is_of_old_run(int(1.5 * SECOND))
     assert follower.jump_back(0) == pytest.approx(1.9)
-    follower.follow(WALK[0], PoseGraph())
+    follower.follow_pose(WALK[0], PoseGraph())
     assert follower.is_of_old_run(int(1.5 * SECOND)) and not follower.is_of_old_run(3 * SECOND)
 
 

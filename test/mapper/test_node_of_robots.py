@@ -159,6 +159,6 @@ def test_a_saved_map_is_gone_on_with_by_both(fleet: Fleet) -> None:
     assert (fleet.told("a", "placed in the map"), fleet.told("b", "placed in the map")) == (False, False)
     for robot in "ab":
         later = replace(WALKS[robot][0], stamp_ns=1000 * SECOND)
-        fleet.node._followers[f"fleet/{robot}"].forget(5.0)
+        fleet.node._followers[f"fleet/{robot}"].believe_next(5.0)
         fleet.node._on_odometry(to_msg.odometry(later), f"fleet/{robot}")
     assert [one.robot for one in fleet.node._graph.sessions] == ["fleet/a", "fleet/b"] * 2

@@ -157,7 +157,7 @@ def test_a_problem_is_solved_aside_while_the_graph_grows() -> None:
     graph = mapped(RIGHT)
     problem = graph.problem()
     assert graph.add_odometry(Odometry(T_odom_body=SIDEWAYS @ BENT[-1], stamp_ns=1000 * SECOND))
-    assert not graph.adopt(problem, problem.solve()).pruned
+    assert not graph.adopt_solution(problem, problem.solve()).pruned
     np.testing.assert_allclose(graph.path()[-1][1], graph.T_map_odom @ SIDEWAYS @ BENT[-1], atol=1e-9)
 
 
@@ -289,7 +289,7 @@ def test_between_keyframes_the_correction_goes_over_from_the_one_to_the_other() 
     aside = np.array([pose(np.eye(3), np.array([x, y, 0.0])) for x, y in ((0.0, 0.0), (1.0, 0.1), (2.0, 0.4))])
     chain = Chain.begun(np.eye(4), Steady()).extended(np.array(graph.keyframes.poses), np.full((2, 2), 1e-4))
     course = SolvedTrajectory(chain, (0, 1, 2), aside)
-    graph.adopt(graph.problem(), Solution((course,), np.zeros(0, bool), np.zeros(0)))
+    graph.adopt_solution(graph.problem(), Solution((course,), np.zeros(0, bool), np.zeros(0)))
     found = [T[:2, 3] for T in graph.corrected(o.stamp_ns for o in odometry([np.eye(4)] * 9))]
     expected = [0.0, 0.025, 0.05, 0.075, 0.1, 0.175, 0.25, 0.325, 0.4]
     np.testing.assert_allclose(found, [(0.25 * k, y) for k, y in enumerate(expected)], atol=1e-9)

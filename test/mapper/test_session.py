@@ -25,7 +25,7 @@ def told(poses: list[Array], stamps_s: list[float] | None = None) -> Session:
     session = Session()
     for k, word in enumerate(odometry(poses)):
         stamp_ns = word.stamp_ns if stamps_s is None else round(stamps_s[k] * SECOND)
-        session.add(Odometry(T_odom_body=word.T_odom_body, stamp_ns=stamp_ns), PARAMS)
+        session.add_pose(Odometry(T_odom_body=word.T_odom_body, stamp_ns=stamp_ns), PARAMS)
     return session
 
 
@@ -36,7 +36,7 @@ def straight(*metres: float) -> list[Array]:
 def test_the_first_pose_is_a_keyframe_and_then_those_that_are_far_enough_on() -> None:
     session = Session()
     words = odometry(straight(0.0, 0.3, 0.5, 0.9, 1.1))
-    assert [session.add(word, PARAMS) for word in words] == [True, False, True, False, True]
+    assert [session.add_pose(word, PARAMS) for word in words] == [True, False, True, False, True]
     assert session.keyframes.stamps_ns == [words[k].stamp_ns for k in (0, 2, 4)]
 
 
@@ -84,7 +84,7 @@ def test_it_covers_what_odometry_told_of_and_no_silence() -> None:
 def test_time_that_runs_back_is_refused_and_changes_nothing() -> None:
     session = told(straight(0.0, 0.5))
     with pytest.raises(ValueError, match="expected a stamp after"):
-        session.add(Odometry(T_odom_body=straight(3.0)[0], stamp_ns=0), PARAMS)
+        session.add_pose(Odometry(T_odom_body=straight(3.0)[0], stamp_ns=0), PARAMS)
     assert len(session.keyframes) == 2 and len(session.variances) == 1
 
 

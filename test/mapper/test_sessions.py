@@ -19,9 +19,9 @@ def driven(*runs: tuple[str, int, int]) -> Sessions:
     """Sessions of these robots with the poses from one number to another, by one clock."""
     sessions = Sessions()
     for robot, first, last in runs:
-        sessions.begin(robot=robot)
+        sessions.begin_session(robot=robot)
         for word in WALK[first:last]:
-            sessions[-1].add(word, MapperParams())
+            sessions[-1].add_pose(word, MapperParams())
     return sessions
 
 
@@ -59,7 +59,7 @@ def test_a_session_without_odometry_gives_way_to_the_next_robot_s() -> None:
 def test_a_moment_in_a_gap_or_before_odometry_will_never_come() -> None:
     sessions = driven(("a", 10, 30))
     for k in range(3):
-        sessions[0].add(replace(WALK[30 + k], stamp_ns=(200 + k) * SECOND // 10), MapperParams())
+        sessions[0].add_pose(replace(WALK[30 + k], stamp_ns=(200 + k) * SECOND // 10), MapperParams())
     assert sessions.in_gap(at("a", 100)) and not sessions.is_before_odometry(at("a", 100))
     assert sessions.is_before_odometry(at("a", 5)) and not sessions.in_gap(at("a", 5))
     assert not any(lost(at("a", 400)) for lost in (sessions.in_gap, sessions.is_before_odometry))
@@ -69,7 +69,7 @@ def test_a_moment_in_a_gap_or_before_odometry_will_never_come() -> None:
 def test_a_moment_that_another_robot_may_have_is_not_lost_in_a_gap_of_the_first() -> None:
     sessions = driven(("a", 10, 30), ("b", 0, 10))
     for k in range(3):
-        sessions[0].add(replace(WALK[30 + k], stamp_ns=(200 + k) * SECOND // 10), MapperParams())
+        sessions[0].add_pose(replace(WALK[30 + k], stamp_ns=(200 + k) * SECOND // 10), MapperParams())
     assert sessions.in_gap(at("a", 100)) and not sessions.in_gap(at("", 100))
 
 

@@ -28,7 +28,7 @@ def driven(
     followers = Followers({robot: Follower(robot, 5.0, lambda: None) for robot in robots})
     for word in (odometry(TRUE)[k] for k in steps):
         for robot, follower in followers.items():
-            follower.follow(replace(word, child_frame_id=f"{robot}/base"), graph)
+            follower.follow_pose(replace(word, child_frame_id=f"{robot}/base"), graph)
 
     def find_mount(words: list, frame_id: str) -> Array | None:
         bodies.append(words[0].child_frame_id)
@@ -84,7 +84,7 @@ def test_a_camera_is_looked_for_under_the_prefix_of_its_robot_where_the_body_has
     graph, frames = PoseGraph(), list[str]()
     followers = Followers({"a": Follower("a", 5.0, lambda: None)})
     for word in odometry(TRUE):
-        followers["a"].follow(replace(word, child_frame_id=f"{prefix}base"), graph)
+        followers["a"].follow_pose(replace(word, child_frame_id=f"{prefix}base"), graph)
     waiting = ClosureQueue(followers, lambda words, frame_id: frames.append(frame_id), most=2)
     told = replace(of(closure(TRUE, 10, 90), "a", "a"), from_frame_id="a/camera", to_frame_id="a/camera")
     waiting.closures = [told]

@@ -27,7 +27,7 @@ def _seen(number: int, *objects: ObjectCloud, session: int = 0, x: float = 0.0) 
 
 def _take(landmarks: Landmarks, sightings: tuple[Sighting, ...], links: list[Link] | None = None) -> list[int]:
     named, merged = landmarks.assign(sightings, links or [])
-    landmarks.add(named, merged)
+    landmarks.add_sightings(named, merged)
     return [sighting.landmark for sighting in named]
 
 
@@ -74,7 +74,7 @@ def test_an_object_may_be_aside_by_the_radius_a_share_of_its_extent_and_the_drif
 def test_what_a_closure_claims_for_another_object_is_not_taken_for_its_place() -> None:
     landmarks = Landmarks(PARAMS)
     named, _ = landmarks.assign(_seen(1, CUP))
-    landmarks.add(named)
+    landmarks.add_sightings(named)
     claimed = Link(index=1, of=named[0], R_there_here=np.eye(3))
     assert _take(landmarks, _seen(2, CUP, box("cup", (0.8, 0, 1))), [claimed]) == [2, 1]
 
@@ -82,17 +82,17 @@ def test_what_a_closure_claims_for_another_object_is_not_taken_for_its_place() -
 def test_what_became_of_another_leaves_its_votes_and_no_trace_where_it_was() -> None:
     landmarks = Landmarks(PARAMS)
     mouse, elsewhere = box("mouse", (3, 0, 1)), box("mouse", (5, 0, 1))
-    landmarks.add(seen.of_landmark(1, np.eye(3)) for seen in _seen(1, CUP))
-    landmarks.add(seen.of_landmark(2, np.eye(3)) for seen in (*_seen(2, mouse), *_seen(3, elsewhere)))
-    landmarks.add((), {2: Merge(into=1, R_into_old=np.eye(3))})
+    landmarks.add_sightings(seen.of_landmark(1, np.eye(3)) for seen in _seen(1, CUP))
+    landmarks.add_sightings(seen.of_landmark(2, np.eye(3)) for seen in (*_seen(2, mouse), *_seen(3, elsewhere)))
+    landmarks.add_sightings((), {2: Merge(into=1, R_into_old=np.eye(3))})
     assert [(known.landmark, known.label) for known in landmarks.known()] == [(1, "mouse")]
     assert _take(landmarks, _seen(4, mouse)) == [3]
 
 
 def test_what_became_of_one_that_is_not_known_has_the_axes_of_that_one() -> None:
     landmarks, R = Landmarks(PARAMS), rotation_from_vector(np.array([0.0, 0.0, 0.5]))
-    landmarks.add(seen.of_landmark(2, np.eye(3)) for seen in _seen(1, CUP))
-    landmarks.add((), {2: Merge(into=1, R_into_old=R)})
+    landmarks.add_sightings(seen.of_landmark(2, np.eye(3)) for seen in _seen(1, CUP))
+    landmarks.add_sightings((), {2: Merge(into=1, R_into_old=R)})
     (again,), _ = landmarks.assign(_seen(2, CUP))
     assert again.landmark == 1 and np.allclose(again.R_landmark_session, R)
 
@@ -139,7 +139,7 @@ def test_a_closure_over_a_drift_onto_the_neighbour_leaves_both_objects_their_ids
         return box(label, (shift, 0, 1), side), box(label, (shift + apart, 0, 1), side)
 
     first, _ = landmarks.assign(_seen(1, *pair(0.0)))
-    landmarks.add(first)
+    landmarks.add_sightings(first)
     assert _take(landmarks, _seen(2, *pair(way * drift)), _linked(*first)) == [1, 2]
     assert _take(landmarks, _seen(3, *pair(way * drift))) == [1, 2]
     assert [known.sightings for known in landmarks.known()] == [3, 3]
@@ -148,7 +148,7 @@ def test_a_closure_over_a_drift_onto_the_neighbour_leaves_both_objects_their_ids
 def test_a_drifted_object_is_not_joined_with_a_neighbour_that_a_keyframe_shows_beside_it() -> None:
     landmarks = Landmarks(PARAMS)
     first, _ = landmarks.assign(_seen(1, CUP, box("cup", (0.15, 0, 1))))
-    landmarks.add(first)
+    landmarks.add_sightings(first)
     assert _take(landmarks, _seen(2, box("cup", (0.14, 0, 1))), _linked(first[0])) == [1]
     assert [known.landmark for known in landmarks.known()] == [1, 2]
 
@@ -156,7 +156,7 @@ def test_a_drifted_object_is_not_joined_with_a_neighbour_that_a_keyframe_shows_b
 def test_closures_that_put_one_object_upon_two_that_a_keyframe_shows_join_nothing() -> None:
     landmarks = Landmarks(PARAMS)
     first, _ = landmarks.assign(_seen(1, CUP, box("cup", (0.5, 0, 1))))
-    landmarks.add(first)
+    landmarks.add_sightings(first)
     links = [Link(index=0, of=sighting, R_there_here=np.eye(3)) for sighting in reversed(first)]
     assert _take(landmarks, _seen(2, CUP, session=1), links) == [2]
     assert len(landmarks) == 2
@@ -166,16 +166,16 @@ def test_landmarks_that_turn_out_to_be_one_are_seen_in_the_axes_of_the_older() -
     turn = rotation_from_vector(np.array([0.0, 1.2, 0.0]))
     landmarks = Landmarks(PARAMS)
     first, _ = landmarks.assign(_seen(1, CUP))
-    landmarks.add(first)
+    landmarks.add_sightings(first)
     T_session_camera = pose(turn.T, np.zeros(3))  # this session began with its axes turned
 
     def again(number: int) -> tuple[Sighting, ...]:
         return sightings_of(keyframe(number, number, (CUP,), 1, T_session_camera))
 
     second, _ = landmarks.assign(again(2))
-    landmarks.add(second)
+    landmarks.add_sightings(second)
     named, merged = landmarks.assign(again(3), [Link(index=0, of=first[0], R_there_here=turn)])
-    landmarks.add(named, merged)
+    landmarks.add_sightings(named, merged)
     assert merged.keys() == {2} and np.allclose(merged[2].R_into_old, turn)
     views = np.array(list(landmarks._known[1].views.values()))
     assert len(views) == 3 and np.allclose(views, views[0])  # the camera stood at one place all the time
@@ -206,7 +206,7 @@ def test_of_many_views_of_an_object_the_most_diverse_stay() -> None:
         _take(landmarks, _seen(number, box("cup", (-x, 0, 1)), x=x))
     spare = landmarks.surplus([1])
     assert len(spare) == 2 and set(spare) <= {1, 2, 3}
-    landmarks.forget(spare)
+    landmarks.forget_keyframes(spare)
     assert landmarks.surplus([1]) == [] and landmarks.known()[0].sightings == 3
 
 
@@ -246,9 +246,9 @@ def test_a_landmark_whose_last_keyframe_is_forgotten_is_gone_and_its_id_is_not_g
     landmarks = Landmarks(PARAMS)
     for keyframe_id in (1, 2):
         assert _take(landmarks, _seen(keyframe_id, CUP)) == [1]
-    landmarks.forget([1])
+    landmarks.forget_keyframes([1])
     assert [known.landmark for known in landmarks.known()] == [1]
-    landmarks.forget([2])
+    landmarks.forget_keyframes([2])
     assert not landmarks.known() and not landmarks._there
     assert _take(landmarks, _seen(3, CUP)) == [2]
 
@@ -257,14 +257,14 @@ def test_a_late_closure_joins_the_landmarks_that_it_says_are_one() -> None:
     turn = rotation_from_vector(np.array([0.0, 1.2, 0.0]))
     landmarks = Landmarks(PARAMS)
     first, _ = landmarks.assign(_seen(1, CUP))
-    landmarks.add(first)
+    landmarks.add_sightings(first)
     second, _ = landmarks.assign(sightings_of(keyframe(2, 2, (CUP,), 1, pose(turn.T, np.zeros(3)))))
-    landmarks.add(second)
+    landmarks.add_sightings(second)
     merged = landmarks.joined([(second[0], first[0])], turn)
     assert merged.keys() == {2} and merged[2].into == 1 and np.allclose(merged[2].R_into_old, turn)
     back = landmarks.joined([(first[0], second[0])], turn.T)
     assert back.keys() == {2} and np.allclose(back[2].R_into_old, turn)
-    landmarks.add((), merged)
+    landmarks.add_sightings((), merged)
     views = np.array(list(landmarks._known[1].views.values()))
     assert len(landmarks) == 1 and len(views) == 2 and np.allclose(views, views[0])
 
@@ -272,7 +272,7 @@ def test_a_late_closure_joins_the_landmarks_that_it_says_are_one() -> None:
 def test_a_late_closure_joins_no_two_that_a_keyframe_shows_together() -> None:
     landmarks = Landmarks(PARAMS)
     first, _ = landmarks.assign(_seen(1, CUP, BOOK))
-    landmarks.add(first)
+    landmarks.add_sightings(first)
     assert landmarks.joined([(first[1], first[0])], np.eye(3)) == {}
     assert landmarks.joined([(first[0], first[0])], np.eye(3)) == {}
 

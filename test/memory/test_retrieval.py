@@ -27,7 +27,7 @@ def _seen(
 def _index(*keyframes: list[Sighting], params: RegistrarParams = PARAMS) -> Index:
     index = Index(params)
     for sightings in keyframes:
-        index.add(sightings)
+        index.add_objects(sightings)
     return index
 
 
@@ -126,7 +126,7 @@ def test_stored_sessions_with_a_landmark_in_common_have_met_and_what_has_no_land
     rooms = [_seen(k, 10.0 * k, CUP, session=k) for k in range(1, 4)]
     named = [x.of_landmark(number, np.eye(3)) for (x,), number in zip(rooms, (5, 6, 5), strict=True)]
     index = Index(PARAMS)
-    index.add(named)
+    index.add_objects(named)
     assert [candidate.keyframe_id for candidate in index.query(_seen(99, 300, CUP, session=1))] == [1, 3, 2]
     unnamed = _index(*rooms).query(_seen(99, 300, CUP, session=3))
     assert [candidate.keyframe_id for candidate in unnamed] == [3, 1, 2]

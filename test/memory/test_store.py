@@ -47,14 +47,14 @@ while True:
 
 def _add(store: Store, seconds: float = 0.0, **kwargs: object) -> int:
     written = keyframe(store.next_keyframe(), seconds, **kwargs)
-    store.add(written, sightings_of(written))
+    store.write_keyframe(written, sightings_of(written))
     return written.keyframe_id
 
 
 def test_a_keyframe_comes_back_as_it_went_in(tmp_path: Path) -> None:
     with_pose = keyframe(1, 3.5, objects=(box("cup", (0, 0, 1)), box("book", (0.3, 0, 1), instance=2)))
     store = Store(tmp_path / "place.db")
-    store.add(with_pose, sightings_of(with_pose))
+    store.write_keyframe(with_pose, sightings_of(with_pose))
     store.close()
     back = Store(tmp_path / "place.db").keyframe(1)
     assert (back.stamp_ns, back.session, back.labels, back.frame_id) == (3_500_000_000, 0, ("cup", "book"), "camera")
@@ -78,7 +78,7 @@ def test_sightings_come_back_with_landmark_position_and_descriptor(tmp_path: Pat
         keyframe(1, objects=(box("cup", (0.2, 0, 1)),), T_odom_camera=moved(1.0)), travelled=0.5, turned=7.0
     )
     (sighting,) = sightings_of(written)
-    store.add(written, [sighting.of_landmark(7, np.eye(3))])
+    store.write_keyframe(written, [sighting.of_landmark(7, np.eye(3))])
     (back,) = store.sightings()
     assert (back.landmark, back.label, back.travelled) == (7, "cup", 0.5)
     assert (store.keyframe(1).travelled, store.keyframe(1).turned) == (0.5, 7.0)
@@ -104,10 +104,10 @@ def test_an_unknown_keyframe_is_a_key_error() -> None:
 def test_merged_landmarks_are_written_in_the_axes_of_the_one_that_stays() -> None:
     store, turn = Store(), rotation_from_vector(np.array([0.0, 0.0, 0.5]))
     written = keyframe(1)
-    store.add(written, [sightings_of(written)[0].of_landmark(9, turn)])
+    store.write_keyframe(written, [sightings_of(written)[0].of_landmark(9, turn)])
     later = keyframe(2, 5.0)
     merged = {9: Merge(into=2, R_into_old=turn)}
-    store.add(later, [sightings_of(later)[0].of_landmark(2, np.eye(3))], merged=merged)
+    store.write_keyframe(later, [sightings_of(later)[0].of_landmark(2, np.eye(3))], merged=merged)
     first, second = store.sightings()
     assert (first.landmark, second.landmark) == (2, 2)
     assert np.allclose(first.R_landmark_session, turn @ turn) and np.array_equal(second.R_landmark_session, np.eye(3))
@@ -119,7 +119,7 @@ def test_a_closure_comes_back_with_its_covariance(tmp_path: Path) -> None:
         from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=0.01 * np.eye(6), labels=("cup",), evidence={"score": 0.5}
     )
     written = keyframe(1)
-    store.add(written, sightings_of(written), [closure])
+    store.write_keyframe(written, sightings_of(written), [closure])
     store.close()
     (back,) = Store(tmp_path / "place.db").closures()
     assert np.array_equal(back.T_from_to, closure.T_from_to) and np.array_equal(back.covariance, closure.covariance)
@@ -130,7 +130,7 @@ def test_the_id_of_a_landmark_is_never_used_again(tmp_path: Path) -> None:
     path, written = tmp_path / "place.db", keyframe(1)
     store = Store(path)
     assert store.next_landmark() == 1
-    store.add(written, [sightings_of(written)[0].of_landmark(7, np.eye(3))])
+    store.write_keyframe(written, [sightings_of(written)[0].of_landmark(7, np.eye(3))])
     store.remove([1])
     store.close()
     opened = Store(path)
@@ -152,7 +152,7 @@ def test_what_cannot_be_written_is_a_store_error_and_leaves_the_store_as_it_was(
     number = _add(store)
     twice = keyframe(number)
     with pytest.raises(StoreError, match="cannot write keyframe 1"):
-        store.add(twice, sightings_of(twice))
+        store.write_keyframe(twice, sightings_of(twice))
     assert store.counts()["objects"] == 1
 
 
@@ -183,7 +183,7 @@ def test_objects_of_one_landmark_are_counted_as_one() -> None:
     store = Store()
     for number, landmark in ((1, 7), (2, 7), (3, 9)):
         written = keyframe(number, float(number))
-        store.add(written, [sightings_of(written)[0].of_landmark(landmark, np.eye(3))])
+        store.write_keyframe(written, [sightings_of(written)[0].of_landmark(landmark, np.eye(3))])
     assert (store.counts()["objects"], store.counts()["landmarks"]) == (3, 2)
 
 
@@ -210,7 +210,7 @@ def test_sessions_of_keyframers_elsewhere_are_told_by_their_origin() -> None:
         ((5.0, 3, "a/0"), (7.0, 3, "a/0"), (6.0, 4, "a/1"), (9.0, 5, ""))
     ):
         written = replace(keyframe(number + 1, seconds, session=session), robot="robot1", origin=origin)
-        store.add(written, sightings_of(written))
+        store.write_keyframe(written, sightings_of(written))
     told = store.origins()
     assert told == {"a/0": (3, 7 * 10**9), "a/1": (4, 6 * 10**9)}
 
@@ -335,7 +335,7 @@ def test_closures_are_counted_over_restarts_and_outlive_their_keyframes(tmp_path
     for total in (2, 4):
         store = Store(tmp_path / "place.db")
         written = keyframe(store.next_keyframe(), float(total))
-        store.add(written, sightings_of(written), [closure, closure])
+        store.write_keyframe(written, sightings_of(written), [closure, closure])
         store.remove([written.keyframe_id])
         assert store.counts()["closures"] == total == len(list(store.closures()))
         store.close()
@@ -350,7 +350,7 @@ def test_the_oldest_closures_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
             for n in (2 * k, 2 * k + 1)
         ]
         written = keyframe(store.next_keyframe(), float(k))
-        store.add(written, sightings_of(written), closures)
+        store.write_keyframe(written, sightings_of(written), closures)
     assert [closure.from_ns for closure in store.closures()] == [5, 6, 7] and store.counts()["closures"] == 3
 
 
@@ -432,7 +432,7 @@ def _damaged(path: Path, table: str, column: str, value: object) -> bytes:
     store = Store(path)
     for seconds in (0.0, 5.0):
         written = keyframe(store.next_keyframe(), seconds)
-        store.add(written, sightings_of(written), [CLOSURE])
+        store.write_keyframe(written, sightings_of(written), [CLOSURE])
     with store._connection as transaction:
         transaction.execute(f"UPDATE {table} SET {column} = ? WHERE id = 1", (value,))
     store.close()
@@ -526,7 +526,7 @@ def test_ids_that_are_used_up_are_a_store_error(what: str) -> None:
     with pytest.raises(StoreError, match=f"expected ids of {what}s up to .*: they are used up"):
         if what in ("keyframe", "landmark"):
             getattr(store, f"next_{what}")()
-        store.add(written, sightings_of(written), [CLOSURE])
+        store.write_keyframe(written, sightings_of(written), [CLOSURE])
 
 
 def test_the_file_shrinks_by_steps_where_many_keyframes_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -626,7 +626,7 @@ def test_a_flipped_bit_is_harmless_or_one_line(tmp_path: Path, repository: Path,
     with closing(Store(path)) as store:
         for k in range(3):
             written = keyframe(k + 1, 10.0 * k, (box("cup", (0, 0, 1)), box("book", (0.5, 0, 1), instance=2)))
-            store.add(written, sightings_of(written), [CLOSURE])
+            store.write_keyframe(written, sightings_of(written), [CLOSURE])
         if log:
             (tmp_path / "killed").mkdir()
             for name in ("place.db", "place.db-wal"):
@@ -667,7 +667,7 @@ def test_a_late_closure_is_written_and_renames_the_landmarks_that_it_joins(tmp_p
     store = Store(tmp_path / "place.db")
     for number in (1, 2):
         stored = keyframe(number, number)
-        store.add(stored, [seen.of_landmark(number, np.eye(3)) for seen in sightings_of(stored)])
+        store.write_keyframe(stored, [seen.of_landmark(number, np.eye(3)) for seen in sightings_of(stored)])
     late = LoopClosure(from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=np.eye(6), labels=("cup",))
     store.add_closure(late, {2: Merge(into=1, R_into_old=np.eye(3))})
     store.close()

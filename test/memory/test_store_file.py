@@ -105,7 +105,7 @@ def test_a_damaged_file_is_refused_and_left_untouched(tmp_path: Path, damage: st
     store = Store(path)
     for number in range(1, 5):
         written = keyframe(number, float(number))
-        store.add(written, sightings_of(written))
+        store.write_keyframe(written, sightings_of(written))
     store.close()
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2] if damage == "cut" else whole[:4096] + b"\x77" * 8192 + whole[12288:])

@@ -25,7 +25,7 @@ def picture(right: int, down: int = 0) -> Array:
 
 def follow(greys: list[Array | None], depth: Array = FLAT, step_ns: int = STEP_NS) -> list[Span]:
     tracks = CornerTracks()
-    ended = [tracks.add(k * step_ns, seen_as(depth, grey)) for k, grey in enumerate(greys)]
+    ended = [tracks.track_view(k * step_ns, seen_as(depth, grey)) for k, grey in enumerate(greys)]
     return [span for span in ended if span is not None]
 
 
@@ -81,12 +81,15 @@ def test_a_picture_of_another_scene_ends_the_span_without_a_false_match() -> Non
 def test_another_size_of_picture_and_a_stamp_that_goes_back_begin_anew() -> None:
     tracks = CornerTracks()
     for k in range(3):
-        assert tracks.add((10 + k) * STEP_NS, seen_as(FLAT, picture(6 * k))) is None
-    spans = [tracks.add(k * STEP_NS, seen_as(FLAT, picture(6 * k))) for k in range(5)]
+        assert tracks.track_view((10 + k) * STEP_NS, seen_as(FLAT, picture(6 * k))) is None
+    spans = [tracks.track_view(k * STEP_NS, seen_as(FLAT, picture(6 * k))) for k in range(5)]
     assert [span is not None for span in spans] == [False] * 4 + [True]
     assert spans[4] is not None and spans[4].first_ns == 0
     half = CAMERA.scaled(2)
-    assert tracks.add(6 * STEP_NS, seen_as(FLAT[::2, ::2], np.ascontiguousarray(picture(0)[::2, ::2]), half)) is None
+    assert (
+        tracks.track_view(6 * STEP_NS, seen_as(FLAT[::2, ::2], np.ascontiguousarray(picture(0)[::2, ::2]), half))
+        is None
+    )
 
 
 PLANE = (2.0 + 0.004 * np.arange(40) - 0.003 * np.arange(30)[:, None]).astype(np.float64)

@@ -55,7 +55,7 @@ def of_body(late_s: float, pace: float = 1.0, until_s: float = 60.0) -> Callable
     seconds = np.arange(0.0, until_s, 0.05)
     track = OdometryTrack()
     for sample in odometry(seconds, swinging(seconds, pace), late_s):
-        track.add(sample)
+        track.add_odometry(sample)
 
     def motions(later_s: float) -> tuple[Array, Array]:
         (first, known), (last, also) = (track.at(stamps_ns + round(1e9 * later_s)) for stamps_ns in STAMPS_NS)

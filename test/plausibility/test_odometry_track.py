@@ -21,7 +21,7 @@ def sample(stamp_ns: int, forward_m: float = 0.0, yaw: float = 0.0, child: str =
 def track(*samples: Odometry) -> OdometryTrack:
     odometry = OdometryTrack()
     for one in samples:
-        odometry.add(one)
+        odometry.add_odometry(one)
     return odometry
 
 
@@ -73,7 +73,7 @@ def test_a_clock_that_goes_back_begins_anew() -> None:
 def test_a_sample_that_comes_after_a_question_counts_in_the_next_answer() -> None:
     odometry = track(sample(0), sample(STEP_NS))
     assert not odometry.at(np.array([2 * STEP_NS]))[1].any()
-    odometry.add(sample(2 * STEP_NS, 3.0))
+    odometry.add_odometry(sample(2 * STEP_NS, 3.0))
     assert odometry.at(np.array([2 * STEP_NS]))[0][0, 0, 3] == 3.0
 
 
@@ -81,7 +81,7 @@ def test_the_newest_samples_are_kept() -> None:
     one = sample(0)
     odometry = track(one)
     for k in range(1, MOST_SAMPLES + 5):
-        odometry.add(Odometry(T_odom_body=one.T_odom_body, stamp_ns=k * APART_NS))
+        odometry.add_odometry(Odometry(T_odom_body=one.T_odom_body, stamp_ns=k * APART_NS))
     assert len(odometry) == MOST_SAMPLES and odometry.span_ns == (5 * APART_NS, (MOST_SAMPLES + 4) * APART_NS)
 
 

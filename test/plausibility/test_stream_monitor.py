@@ -45,14 +45,14 @@ def watch(
         while waiting and waiting[0].stamp_ns <= stamp_ns:
             monitor.take_odometry(waiting.pop(0))
         view = seen_as(depth * np.float32(scale), grey, camera)
-        monitor.follow(begin_ns + stamp_ns, view, "camera", mount, has_odometry=bool(samples))
+        monitor.follow_view(begin_ns + stamp_ns, view, "camera", mount, has_odometry=bool(samples))
     return monitor
 
 
 def rest(monitor: StreamMonitor, picture: tuple[Array, Array], seconds: float, camera: Intrinsics = CAMERA) -> None:
     """One view a second, the last after so many, of a camera that does not move."""
     for stamp_s in [*np.arange(0.0, seconds), seconds]:
-        monitor.follow(round(1e9 * stamp_s), seen_as(*picture, camera), "camera", None)
+        monitor.follow_view(round(1e9 * stamp_s), seen_as(*picture, camera), "camera", None)
 
 
 def anchors(monitor: StreamMonitor) -> list[str]:
@@ -112,7 +112,7 @@ def test_a_camera_at_rest_is_believed_after_patience_and_not_before(pictures: Pi
     monitor = StreamMonitor()
     rest(monitor, pictures[0], PATIENCE_S)
     assert not monitor.proven
-    monitor.follow(round(1e9 * PATIENCE_S) + 1, seen_as(*pictures[0]), "camera", None)
+    monitor.follow_view(round(1e9 * PATIENCE_S) + 1, seen_as(*pictures[0]), "camera", None)
     assert monitor.proven and not monitor.findings and monitor.fit is None
 
 
@@ -129,7 +129,7 @@ def test_a_camera_with_odometry_is_not_proven_before_that_tells_its_scale(pictur
 @pytest.mark.parametrize("mount", [MOUNT, None])
 def test_depth_of_1_3_times_is_found_beside_odometry(pictures: Pictures, mount: Array | None) -> None:
     monitor = watch(pictures, samples=OWN, mount=mount, scale=1.3)
-    monitor.finish()
+    monitor.judge_rest()
     assert anchors(monitor)[0] == "depth-scale" and monitor.doubt == monitor.findings[0].what
     assert not monitor.proven and not monitor.disowned
 
@@ -173,6 +173,6 @@ def test_another_camera_begins_anew(pictures: Pictures) -> None:
 def test_a_clock_that_goes_back_begins_anew_and_a_late_view_does_not(pictures: Pictures) -> None:
     late, again = (watch(pictures) for _ in range(2))
     last_ns = round(1e9 * SECONDS[-1])
-    late.follow(last_ns - JUMP_NS + 1, seen_as(*pictures[0]), "camera", MOUNT)
-    again.follow(last_ns - JUMP_NS, seen_as(*pictures[0]), "camera", MOUNT)
+    late.follow_view(last_ns - JUMP_NS + 1, seen_as(*pictures[0]), "camera", MOUNT)
+    again.follow_view(last_ns - JUMP_NS, seen_as(*pictures[0]), "camera", MOUNT)
     assert late.proven and not again.proven and again.fit is None

@@ -29,7 +29,7 @@ def _seen(store: Store, tracks: CameraTracks, camera: tuple[str, str], session: 
     robot, frame_id = camera
     made = keyframe(store.next_keyframe(), seconds, session=session)
     made = replace(made, robot=robot, frame_id=frame_id)
-    store.add(made, sightings_of(made))
+    store.write_keyframe(made, sightings_of(made))
     tracks.of(camera).see(made)
     return made
 
@@ -45,10 +45,10 @@ def test_each_camera_of_each_robot_has_a_track_of_its_own_and_of_too_many_the_ol
 
 def test_the_camera_that_is_followed_here_stays_however_many_others_there_are() -> None:
     tracks = _tracks()
-    here = tracks.follow(frame(0, ()))
+    here = tracks.track_of(frame(0, ()))
     for k in range(2 * MOST_CAMERAS):
         tracks.of(("robot", str(k)))
-    assert tracks.follow(frame(1, ())) is here and len(tracks) == MOST_CAMERAS
+    assert tracks.track_of(frame(1, ())) is here and len(tracks) == MOST_CAMERAS
 
 
 def test_sessions_of_another_robot_at_the_same_time_are_not_hidden_and_own_earlier_ones_are() -> None:
@@ -62,7 +62,7 @@ def test_sessions_of_another_robot_at_the_same_time_are_not_hidden_and_own_earli
 
 def test_what_a_robots_other_camera_sees_in_the_same_run_is_not_hidden() -> None:
     store, tracks = Store(), _tracks()
-    tracks.of(FRONT).begin(Clock(10 * SECOND, 0), frozenset(), PARAMS)
+    tracks.of(FRONT).begin_run(Clock(10 * SECOND, 0), frozenset(), PARAMS)
     _seen(store, tracks, FRONT, 0, 10.0)
     assert tracks.hidden_from(Clock(10 * SECOND + 5, 1), REAR, store) == frozenset()
 
@@ -70,12 +70,12 @@ def test_what_a_robots_other_camera_sees_in_the_same_run_is_not_hidden() -> None
 def test_where_a_looped_bag_begins_anew_what_both_cameras_saw_before_is_hidden_from_both() -> None:
     store, tracks = Store(), _tracks()
     for session, camera in enumerate((FRONT, REAR)):
-        tracks.of(camera).begin(Clock(10 * SECOND, session), frozenset(), PARAMS)
+        tracks.of(camera).begin_run(Clock(10 * SECOND, session), frozenset(), PARAMS)
         _seen(store, tracks, camera, session, 10.0)
         _seen(store, tracks, camera, session, 40.0)
     again = Clock(10 * SECOND, 2)
     assert tracks.hidden_from(again, FRONT, store) == {0, 1}
-    tracks.of(FRONT).begin(again, frozenset({0, 1}), PARAMS)
+    tracks.of(FRONT).begin_run(again, frozenset({0, 1}), PARAMS)
     _seen(store, tracks, FRONT, 2, 10.1)
     assert tracks.hidden_from(Clock(10 * SECOND, 3), REAR, store) == {0, 1}
 
@@ -100,7 +100,7 @@ def _goes_on(
         frame_id=frame_id,
     )
     tracks.go_on(made, clock, recollection)
-    store.add(made, sightings_of(made))
+    store.write_keyframe(made, sightings_of(made))
 
 
 def test_cameras_whose_keyframes_came_one_after_the_other_hide_nothing_once_they_go_on_together() -> None:

@@ -57,7 +57,7 @@ def means() -> Iterator[Means]:
     store = Store()
     for number, seconds in enumerate(STORED, 1):
         stored = keyframe(number, seconds, CUPS)
-        store.add(stored, sightings_of(stored))
+        store.write_keyframe(stored, sightings_of(stored))
     with ThreadPoolExecutor(1) as pool:
         yield Means(store, Recorded(), refuse, Confirmation(PARAMS), pool)
     store.close()

@@ -78,9 +78,9 @@ def test_a_doubtful_pose_waits_until_three_sure_ones_agree_and_keeps_its_own_sta
     hold(confirmation, first, confirmation.decide(*first))
     for at_m in (0.1, 0.2):
         confirmation.decide(*tried(at_m))
-    assert confirmation.settle(first.source.stamp_ns) == ([], []) and len(confirmation) == 1
+    assert confirmation.decide_waiting(first.source.stamp_ns) == ([], []) and len(confirmation) == 1
     confirmation.decide(*tried(0.4))
-    (late,), refused = confirmation.settle(first.source.stamp_ns)
+    (late,), refused = confirmation.decide_waiting(first.source.stamp_ns)
     assert refused == [] and len(confirmation) == 0
     assert (late.closure.from_ns, late.closure.to_ns) == (first.target.stamp_ns, first.source.stamp_ns)
     assert late.closure.evidence["agreeing"] == 3 and late.closure.evidence["agreeing_share"] > 0.99
@@ -104,8 +104,8 @@ def test_a_doubtful_pose_that_slides_is_refused_in_the_end_with_the_gate_s_reaso
     waiting = hold(confirmation, slid, confirmation.decide(*slid))
     for at_m in (0.2, 0.4, 0.6):
         confirmation.decide(*tried(at_m))
-    assert confirmation.settle(slid.source.stamp_ns + 10 * 10**9) == ([], [])
-    accepted, (refused,) = confirmation.settle(slid.source.stamp_ns + 10 * 10**9 + 1)
+    assert confirmation.decide_waiting(slid.source.stamp_ns + 10 * 10**9) == ([], [])
+    accepted, (refused,) = confirmation.decide_waiting(slid.source.stamp_ns + 10 * 10**9 + 1)
     assert accepted == [] and (refused.reason, refused.detail) == waiting.refusal
     assert np.allclose(refused.T_from_to, ASIDE) and refused.evidence == waiting.closure.evidence
     assert (refused.from_session, refused.to_session) == (slid.target.session, slid.source.session)
@@ -118,7 +118,7 @@ def test_an_accepted_pose_that_its_neighbours_contradict_is_not_published() -> N
     false = tried(0.6, ASIDE)
     assert false.registration.accepted
     hold(confirmation, false, confirmation.decide(*false))
-    confirmed, (refused,) = confirmation.settle(None)
+    confirmed, (refused,) = confirmation.decide_waiting(None)
     assert confirmed == [] and refused.reason is Reason.NEIGHBOURS and "0.00 < 0.5" in refused.detail
 
 
@@ -147,7 +147,7 @@ def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_
     hold(confirmation, right, confirmation.decide(*right))
     for at_m in (0.5, 0.6, 0.7):
         confirmation.decide(*tried(at_m))
-    (late,), _ = confirmation.settle(right.source.stamp_ns)
+    (late,), _ = confirmation.decide_waiting(right.source.stamp_ns)
     assert late.closure.to_ns == right.source.stamp_ns
 
 

@@ -31,7 +31,7 @@ def statement(
 
 def received(*statements: Statement) -> tuple[Consistency, list[int]]:
     consistency = Consistency()
-    return consistency, [consistency.add(one) for one in statements]
+    return consistency, [consistency.add_statement(one) for one in statements]
 
 
 def test_true_poses_of_neighbours_agree_and_support_each_other() -> None:
@@ -63,7 +63,7 @@ def test_a_cluster_without_one_that_is_sure_supports_nothing() -> None:
     unsure = [statement(x, x + 0.1, odds=5.0, sure=False) for x in (0.0, 0.2, 0.4)]
     consistency, numbers = received(*unsure)
     assert consistency.support(numbers[0]).agreeing == 0
-    consistency.add(statement(0.6, 0.7))
+    consistency.add_statement(statement(0.6, 0.7))
     assert consistency.support(numbers[0]).agreeing == 3
 
 
@@ -80,7 +80,7 @@ def test_what_is_beyond_reach_is_forgotten() -> None:
 def test_a_camera_that_turns_on_the_spot_fills_no_memory() -> None:
     consistency = Consistency()
     for k in range(MOST + 20):
-        last = consistency.add(statement(1e-4 * k, 1e-4 * k))
+        last = consistency.add_statement(statement(1e-4 * k, 1e-4 * k))
     assert len(consistency) == MOST and last in consistency
 
 
@@ -112,7 +112,7 @@ def passes(jitter: Jitter, false: int = 0, seed: int = 0, by_odometry: bool = Tr
         here, there = (
             end._replace(T_session_camera=end.T_session_camera @ random_pose(jitter, rng)) for end in one[:2]
         )
-        consistency.add(one._replace(source=here, target=there, by_odometry=by_odometry))
+        consistency.add_statement(one._replace(source=here, target=there, by_odometry=by_odometry))
     return consistency
 
 
@@ -142,8 +142,8 @@ def support_of(T: Array, jitter: Jitter) -> Support:
     """What three true poses, farther on, say of a pose, once so much jitter was measured."""
     consistency = passes(jitter)
     for x in (10.0, 10.1, 10.2):
-        consistency.add(statement(x, x))
-    return consistency.support(consistency.add(statement(10.3, 10.3, T)))
+        consistency.add_statement(statement(x, x))
+    return consistency.support(consistency.add_statement(statement(10.3, 10.3, T)))
 
 
 def test_with_jitter_a_neighbour_2_degrees_beyond_the_tolerance_no_longer_opposes() -> None:

@@ -83,18 +83,18 @@ class Robot:
 
     def searched(self, seconds: float, T_world_camera: Array) -> Outcome:
         self.registrar.track(replace(_frame(seconds, T_world_camera), robot=self.name))
-        (window,) = self.registrar.end()
+        (window,) = self.registrar.end_windows()
         return self.registrar.search(window)
 
     def fetches(self, summary: bytes, other: Robot) -> Outcome | None:
         """What the keyframe of another's summary comes to here; None where it is not asked for."""
-        request = self.exchange.receive(summary)
+        request = self.exchange.receive_summary(summary)
         if request is None:
             return None
         other.exchange.note(request, NOW)
         packed = other.exchange.answer(NOW)
         assert packed is not None
-        return self.exchange.take(packed)
+        return self.exchange.receive_delivery(packed)
 
 
 def _frame(seconds: float, T_world_camera: Array) -> Frame:
@@ -167,14 +167,14 @@ def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays(monkeypat
     seen = _frame(10, HERE)
     named = [replace(seen.objects[0], label=f"{k:0900d}", instance=k + 1) for k in range(480)]
     a.registrar.track(replace(seen, objects=tuple(named), robot="a"))
-    (window,) = a.registrar.end()
+    (window,) = a.registrar.end_windows()
     assert a.exchange.announce(a.registrar.search(window)) is None
     assert a.exchange.counters == {"dropped: too large to announce": 1}
 
 
 def test_a_keyframe_without_objects_of_ours_is_not_asked_for() -> None:
     a, b = Robot("a"), Robot("b")
-    assert a.exchange.receive(b.sees(30, HERE)) is None
+    assert a.exchange.receive_summary(b.sees(30, HERE)) is None
     assert a.exchange.counters["dropped: unlike"] == 1 and a.exchange.counters["summaries received"] == 1
 
 
@@ -182,21 +182,21 @@ def test_a_summary_that_is_heard_twice_asks_nothing_twice() -> None:
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
     summary = b.sees(30, BESIDE)
-    assert a.exchange.receive(summary) is not None
-    assert a.exchange.receive(summary) is None and a.exchange.counters["dropped: received before"] == 1
+    assert a.exchange.receive_summary(summary) is not None
+    assert a.exchange.receive_summary(summary) is None and a.exchange.counters["dropped: received before"] == 1
 
 
 def test_ones_own_summary_and_that_of_a_robot_of_ones_name_ask_nothing() -> None:
     a, namesake = Robot("a"), Robot("a", run="another")
     a.sees(10, HERE)
-    assert a.exchange.receive(a.sees(20, BESIDE)) is None and not a.exchange.counters["summaries received"]
-    assert a.exchange.receive(namesake.sees(30, BESIDE)) is None
+    assert a.exchange.receive_summary(a.sees(20, BESIDE)) is None and not a.exchange.counters["summaries received"]
+    assert a.exchange.receive_summary(namesake.sees(30, BESIDE)) is None
     assert a.exchange.counters["dropped: a robot of our name"] == 1
 
 
 def test_a_later_keyframe_of_ours_is_looked_at_by_the_other() -> None:
     a, b = Robot("a"), Robot("b")
-    assert a.exchange.receive(b.sees(10, HERE)) is None
+    assert a.exchange.receive_summary(b.sees(10, HERE)) is None
     outcome = b.fetches(a.sees(30, BESIDE), a)
     assert outcome is not None and _moments(outcome.closures) == [(("b", "a"), 10, 30)]
 
@@ -205,13 +205,13 @@ def test_a_later_keyframe_of_ours_is_looked_at_by_the_other() -> None:
 def test_of_two_that_are_told_before_either_is_heard_that_of_the_older_is_compared(of_a: int, of_b: int) -> None:
     a, b = Robot("a"), Robot("b")
     told_by_a, told_by_b = a.sees(of_a, HERE), b.sees(of_b, BESIDE)
-    asked = a.exchange.receive(told_by_b) is not None, b.exchange.receive(told_by_a) is not None
+    asked = a.exchange.receive_summary(told_by_b) is not None, b.exchange.receive_summary(told_by_a) is not None
     assert asked == ((True, False) if of_a <= of_b else (False, True))
 
 
 def test_whoever_has_a_keyframe_when_it_hears_looks_though_clocks_differ() -> None:
     a, b = Robot("a"), Robot("b")
-    b.exchange.receive(a.sees(5000, HERE))
+    b.exchange.receive_summary(a.sees(5000, HERE))
     outcome = a.fetches(b.sees(30, BESIDE), b)
     assert outcome is not None and _moments(outcome.closures) == [(("a", "b"), 5000, 30)]
 
@@ -219,9 +219,9 @@ def test_whoever_has_a_keyframe_when_it_hears_looks_though_clocks_differ() -> No
 def test_a_keyframe_that_is_stored_but_not_told_yet_is_left_to_the_other() -> None:
     a, b = Robot("a"), Robot("b")
     searched = a.searched(10, HERE)
-    assert a.exchange.receive(b.sees(30, BESIDE)) is None
+    assert a.exchange.receive_summary(b.sees(30, BESIDE)) is None
     summary = a.exchange.announce(searched)
-    assert summary is not None and b.exchange.receive(summary) is not None
+    assert summary is not None and b.exchange.receive_summary(summary) is not None
 
 
 def test_every_pair_of_three_robots_is_looked_at_once() -> None:
@@ -241,7 +241,7 @@ def test_the_most_promising_is_answered_first_and_one_answer_serves_all() -> Non
     b = Robot("b")
     b.sees(1, HERE), b.sees(2, AWAY), b.sees(3, BESIDE)
     for name in "ac":
-        b.exchange.receive(Robot(name).sees(1, AWAY))
+        b.exchange.receive_summary(Robot(name).sees(1, AWAY))
     for asker, number, votes in (("a", 1, 2.0), ("a", 2, 1.5), ("a", 3, 2.5), ("c", 2, 1.5), ("c", 2, 1.5)):
         b.exchange.note(pack_request(Request(Name("b", number), votes, asker)), NOW)
     assert b.exchange.waiting == 3
@@ -299,13 +299,13 @@ def test_a_keyframe_that_was_not_asked_for_comes_to_nothing_and_another_one_is_r
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
     summary = b.sees(30, BESIDE)
-    request = a.exchange.receive(summary)
+    request = a.exchange.receive_summary(summary)
     assert request is not None and unpack_request(request).name == Name("b", 1)
     keyframe, _ = b.registrar.moment(1)
     keyframe = replace(keyframe, frame_id=f"b/{keyframe.frame_id}")
     with pytest.raises(ValueError, match="expected the keyframe of its summary, got one at 31000000000 ns"):
-        a.exchange.take(pack_delivery("b", replace(keyframe, stamp_ns=31 * SECOND)))
-    assert a.exchange.take(pack_delivery("c", keyframe)) is None
+        a.exchange.receive_delivery(pack_delivery("b", replace(keyframe, stamp_ns=31 * SECOND)))
+    assert a.exchange.receive_delivery(pack_delivery("c", keyframe)) is None
     assert a.exchange.counters["dropped: not asked for"] == 1
 
 
@@ -313,16 +313,16 @@ def test_what_a_closure_ties_already_is_not_asked_for() -> None:
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
     assert a.fetches(b.sees(30, BESIDE), b).closures  # type: ignore[union-attr]
-    assert a.exchange.receive(b.sees(30.5, HERE)) is None
+    assert a.exchange.receive_summary(b.sees(30.5, HERE)) is None
 
 
 def test_a_stored_keyframe_that_was_forgotten_meanwhile_is_not_tried() -> None:
     a, b = Robot("a", PARAMS.replaced(max_keyframes=1)), Robot("b")
     a.sees(10, HERE)
-    request = a.exchange.receive(b.sees(30, BESIDE))
+    request = a.exchange.receive_summary(b.sees(30, BESIDE))
     a.sees(50, AWAY)
     b.exchange.note(request, NOW)  # type: ignore[arg-type]
-    outcome = a.exchange.take(b.exchange.answer(NOW))  # type: ignore[arg-type]
+    outcome = a.exchange.receive_delivery(b.exchange.answer(NOW))  # type: ignore[arg-type]
     assert outcome is not None and (outcome.closures, outcome.rejected) == ((), ())
     assert b.exchange.announce(Outcome()) is None
 
@@ -330,8 +330,8 @@ def test_a_stored_keyframe_that_was_forgotten_meanwhile_is_not_tried() -> None:
 def test_no_time_refuses_as_over_budget() -> None:
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
-    b.exchange.note(a.exchange.receive(b.sees(30, BESIDE)), NOW)  # type: ignore[arg-type]
-    outcome = a.exchange.take(b.exchange.answer(NOW), seconds=0.0)  # type: ignore[arg-type]
+    b.exchange.note(a.exchange.receive_summary(b.sees(30, BESIDE)), NOW)  # type: ignore[arg-type]
+    outcome = a.exchange.receive_delivery(b.exchange.answer(NOW), seconds=0.0)  # type: ignore[arg-type]
     assert outcome is not None and {refusal.reason for refusal in outcome.rejected} == {Reason.OVER_BUDGET}
 
 
@@ -373,7 +373,7 @@ def test_after_a_restart_what_the_store_has_is_not_published_again(tmp_path: Pat
 def test_frames_without_a_robot_go_by_the_name_of_the_exchange() -> None:
     a, b = Robot("a"), Robot("b")
     a.registrar.track(_frame(10, HERE))
-    (window,) = a.registrar.end()
+    (window,) = a.registrar.end_windows()
     a.exchange.announce(a.registrar.search(window))
     (closure,) = a.fetches(b.sees(30, BESIDE), b).closures  # type: ignore[union-attr]
     assert closure.robots == ("a", "b")
@@ -393,9 +393,9 @@ def test_a_forged_summary_with_the_run_of_another_and_the_largest_number_silence
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
     if not comes_first:
-        a.exchange.receive(b.sees(20, AWAY))
+        a.exchange.receive_summary(b.sees(20, AWAY))
     true = b.sees(30, BESIDE)
-    a.exchange.receive(_as(true, "b", 2**63 - 1))
+    a.exchange.receive_summary(_as(true, "b", 2**63 - 1))
     assert a.exchange.counters["dropped: a far jump"] == (not comes_first)
     outcome = a.fetches(true, b)
     assert outcome is not None and _moments(outcome.closures) == [(("a", "b"), 10, 30)]
@@ -407,7 +407,7 @@ def test_a_summary_under_the_name_of_the_true_one_keeps_that_out_of_nothing() ->
     true = b.sees(30, BESIDE)
     summary = unpack_summary(true)
     moved = tuple(replace(one, stamp_ns=one.stamp_ns + 5) for one in summary.sightings)
-    a.exchange.receive(pack_summary(replace(summary, sightings=moved)))
+    a.exchange.receive_summary(pack_summary(replace(summary, sightings=moved)))
     outcome = a.fetches(true, b)
     assert outcome is not None and outcome.closures
 
@@ -422,18 +422,18 @@ def test_a_summary_with_the_moment_of_the_true_one_and_other_objects_does_not_ta
     summary = unpack_summary(true)
     moved = tuple(replace(one, position=one.position + 0.5) for one in summary.sightings)
     forged = pack_summary(replace(summary, sightings=moved))
-    requests = [a.exchange.receive(packed) for packed in ((forged, true) if forged_first else (true, forged))]
+    requests = [a.exchange.receive_summary(packed) for packed in ((forged, true) if forged_first else (true, forged))]
     b.exchange.note(next(filter(None, requests)), NOW)
     answer = b.exchange.answer(NOW)
     assert answer is not None
-    outcome = a.exchange.take(answer)
+    outcome = a.exchange.receive_delivery(answer)
     assert outcome is not None and outcome.closures
 
 
 def test_a_forged_keyframe_does_not_use_up_the_request_for_the_true_one() -> None:
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
-    request = a.exchange.receive(b.sees(30, BESIDE))
+    request = a.exchange.receive_summary(b.sees(30, BESIDE))
     b.exchange.note(request, NOW)  # type: ignore[arg-type]
     true = b.exchange.answer(NOW)
     assert true is not None
@@ -441,10 +441,10 @@ def test_a_forged_keyframe_does_not_use_up_the_request_for_the_true_one() -> Non
     elsewhere = replace(keyframe, T_odom_camera=AWAY)
     for forged in (replace(keyframe, stamp_ns=7), replace(keyframe, frame_id="e/camera"), elsewhere):
         with pytest.raises(ValueError, match="of its summary"):
-            a.exchange.take(pack_delivery("b", forged))
-    outcome = a.exchange.take(true)
+            a.exchange.receive_delivery(pack_delivery("b", forged))
+    outcome = a.exchange.receive_delivery(true)
     assert outcome is not None and outcome.closures
-    assert a.exchange.take(true) is None and not a.exchange.awaits(true)
+    assert a.exchange.receive_delivery(true) is None and not a.exchange.awaits(true)
 
 
 def test_summaries_of_one_push_no_request_for_those_of_others_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -452,16 +452,16 @@ def test_summaries_of_one_push_no_request_for_those_of_others_out(monkeypatch: p
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
     true = b.sees(30, BESIDE)
-    first = a.exchange.receive(true)
+    first = a.exchange.receive_summary(true)
     assert first is not None
     forged = [_as(true, "e", number, "e") for number in range(1, 60)]
-    assert sum(a.exchange.receive(one) is not None for one in forged) == 19
-    later = a.exchange.receive(b.sees(31, HERE))
+    assert sum(a.exchange.receive_summary(one) is not None for one in forged) == 19
+    later = a.exchange.receive_summary(b.sees(31, HERE))
     assert later is not None and a.exchange.counters["dropped: too many asked for"] == 40
     for request in (first, later):
         b.exchange.note(request, NOW)
     packed = list(iter(lambda: b.exchange.answer(NOW), None))
-    assert len(packed) == 2 and all(a.exchange.take(one) is not None for one in packed)
+    assert len(packed) == 2 and all(a.exchange.receive_delivery(one) is not None for one in packed)
 
 
 def test_a_request_that_is_never_answered_keeps_its_place_for_a_while_only(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -469,8 +469,8 @@ def test_a_request_that_is_never_answered_keeps_its_place_for_a_while_only(monke
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
     first, second, third = b.sees(30, BESIDE), b.sees(31, HERE), b.sees(32, BESIDE)
-    assert a.exchange.receive(first, NOW) is not None and a.exchange.receive(second, NOW) is None
-    assert a.exchange.receive(third, NOW + pending.ASKED_S + 1.0) is not None
+    assert a.exchange.receive_summary(first, NOW) is not None and a.exchange.receive_summary(second, NOW) is None
+    assert a.exchange.receive_summary(third, NOW + pending.ASKED_S + 1.0) is not None
     assert a.exchange.counters["dropped: not answered"] == 1
 
 
@@ -479,7 +479,7 @@ def test_a_flood_of_requests_starves_no_other_asker() -> None:
     for k in range(6):
         b.sees(1 + k, (HERE, BESIDE, AWAY)[k % 3])
     for name in "ae":
-        b.exchange.receive(Robot(name).sees(50, AWAY))
+        b.exchange.receive_summary(Robot(name).sees(50, AWAY))
     for number in range(1, 6):
         for asker in ("e", "", "nobody that is known"):
             b.exchange.note(pack_request(Request(Name("b", number), 1e9, asker)), NOW)
@@ -491,7 +491,7 @@ def test_a_flood_of_requests_starves_no_other_asker() -> None:
 def test_the_same_asker_gets_the_same_keyframe_again_after_a_while_only() -> None:
     a, b = Robot("a"), Robot("b")
     b.sees(1, HERE)
-    b.exchange.receive(a.sees(50, AWAY))
+    b.exchange.receive_summary(a.sees(50, AWAY))
     request = pack_request(Request(Name("b", 1), 1.0, "a"))
     answered = []
     for now in (NOW, NOW + 1.0, NOW + wishes.AGAIN_S):
@@ -510,10 +510,10 @@ def test_a_frame_has_the_prefix_of_its_robot_and_a_run_one_robot() -> None:
     true = b.sees(30, BESIDE)
     assert unpack_summary(true).frame_id.startswith("b/")
     for robot, frame_id in (("e", "b/camera"), ("e", "camera"), ("e", "a/camera")):
-        assert a.exchange.receive(_as(true, "e", 1, robot, frame_id)) is None
+        assert a.exchange.receive_summary(_as(true, "e", 1, robot, frame_id)) is None
     assert a.exchange.counters["dropped: a frame of another robot"] == 3
-    assert a.exchange.receive(true) is not None
-    assert a.exchange.receive(_as(true, "b", 2, "e")) is None
+    assert a.exchange.receive_summary(true) is not None
+    assert a.exchange.receive_summary(_as(true, "b", 2, "e")) is None
     assert a.exchange.counters["dropped: a run of another robot"] == 1
 
 
@@ -524,11 +524,11 @@ def test_names_of_registrars_that_there_are_not_take_no_place_of_one_that_gave_a
     true = c.sees(40, BESIDE)
     forged = [_as(true, f"e{k}", 1, f"e{k}") for k in range(200)]
     for one in forged:
-        a.exchange.receive(one, 1.0)
+        a.exchange.receive_summary(one, 1.0)
     assert a.exchange.counters["dropped: too many registrars"] == 200 - (known.MOST_RUNS - 1)
-    assert a.exchange.receive(b.sees(33, AWAY), 2.0) is not None
-    assert a.exchange.receive(true, 2.0) is None
-    assert a.exchange.receive(true, 2.0 + known.TRIAL_S) is not None
+    assert a.exchange.receive_summary(b.sees(33, AWAY), 2.0) is not None
+    assert a.exchange.receive_summary(true, 2.0) is None
+    assert a.exchange.receive_summary(true, 2.0 + known.TRIAL_S) is not None
 
 
 def test_a_session_of_one_keeps_its_number_though_another_names_thousands(monkeypatch: pytest.MonkeyPatch) -> None:

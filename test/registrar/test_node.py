@@ -80,7 +80,7 @@ def called(node: RegistrarNode, service: str) -> Any:
 def test_a_store_that_is_locked_refuses_a_reset_and_keeps_what_waits(make: Making, tmp_path: Path) -> None:
     node = make()
     node._registrar.track(frame(0, CUP))
-    (window,) = node._registrar.end()
+    (window,) = node._registrar.end_windows()
     node._registrar.search(window)
     with held(tmp_path / "place.db"):
         answer, _ = call(node, "reset")
@@ -97,14 +97,14 @@ def test_a_store_in_a_file_is_not_reset_unless_the_start_allows_it(make: Making)
     node._registrar.track(frame(0, CUP))
     answer, _ = call(node, "reset")
     assert not answer.success and "expected allow_remote_reset:=true for a store in a file" in answer.message
-    assert len(node._registrar.end()) == 1  # nor is the keyframe in hand gone
+    assert len(node._registrar.end_windows()) == 1  # nor is the keyframe in hand gone
     node.close()
 
 
 def test_a_reset_says_where_what_was_stored_is_now(make: Making, tmp_path: Path) -> None:
     node = make()
     node._registrar.track(frame(0, CUP))
-    (window,) = node._registrar.end()
+    (window,) = node._registrar.end_windows()
     node._registrar.search(window)
     answer, _ = call(node, "reset")
     (aside,) = tmp_path.glob("place-*.db")
@@ -161,7 +161,7 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
     monkeypatch.setattr(node._registrar, "search", slow)
     for seconds in (0, 10):
         node._registrar.track(frame(seconds, CUP))
-        (window,) = node._registrar.end()
+        (window,) = node._registrar.end_windows()
         node.accept(seconds * SECOND)
         node.searcher.put(Job(seconds * SECOND, window, time.monotonic()))
     node._registrar.track(frame(20, CUP))
@@ -218,7 +218,7 @@ def test_a_full_store_says_what_goes(make: Making, monkeypatch: pytest.MonkeyPat
 def with_two_to_store(node: RegistrarNode) -> RegistrarNode:
     """The node with a keyframe that waits for its search, and another in hand."""
     node._registrar.track(frame(0, CUP))
-    (waiting,) = node._registrar.end()
+    (waiting,) = node._registrar.end_windows()
     node.searcher.close()
     node.searcher.put(Job(0, waiting, time.monotonic()))
     node._registrar.track(frame(30, CUP))
@@ -264,7 +264,7 @@ def test_a_keyframe_that_cannot_be_stored_is_not_in_the_way_of_the_next(
     make: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = with_two_to_store(make())
-    add, tries = node._registrar._store.add, []
+    add, tries = node._registrar._store.write_keyframe, []
 
     def full_once(*arguments: Any) -> None:
         tries.append(arguments)
@@ -272,7 +272,7 @@ def test_a_keyframe_that_cannot_be_stored_is_not_in_the_way_of_the_next(
             raise OSError("the disk is full")
         add(*arguments)
 
-    monkeypatch.setattr(node._registrar._store, "add", full_once)
+    monkeypatch.setattr(node._registrar._store, "write_keyframe", full_once)
     node.close()
     stored = Store(tmp_path / "place.db", read_only=True)
     assert [stored.keyframe(k).stamp_ns for k in stored.keyframe_ids()] == [30_000_000_000]
@@ -281,7 +281,7 @@ def test_a_keyframe_that_cannot_be_stored_is_not_in_the_way_of_the_next(
 
 def window_at(node: RegistrarNode, seconds: int) -> FrameWindow:
     node._registrar.track(frame(seconds, CUP))
-    (window,) = node._registrar.end()
+    (window,) = node._registrar.end_windows()
     node.accept(seconds * SECOND)
     return window
 

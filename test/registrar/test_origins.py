@@ -54,7 +54,7 @@ def test_a_store_that_is_opened_anew_goes_on_with_the_same_sessions_and_knows_wh
     received = Origins(store, SessionNumbers(3)).received(_arrival("a", 5))
     assert received is not None
     stored = received[0].numbered(1)
-    store.add(stored, sightings_of(stored))
+    store.write_keyframe(stored, sightings_of(stored))
     again = Origins(store, SessionNumbers(store.next_session()))
     assert _sessions(again, _arrival("a", 5), _arrival("a", 6), _arrival("c", 6)) == [None, 3, 4]
     assert again.received(_arrival("a", 7))[1] == Clock(0, 3)  # type: ignore[index]

@@ -160,7 +160,7 @@ def test_a_search_that_is_hurried_tries_no_further_place_and_remembers_the_keyfr
         registrar = Registrar(PARAMS.replaced(threads=1, closures=4))
         _run(registrar, *frames)
         registrar.track(last)
-        (window,) = registrar.end()
+        (window,) = registrar.end_windows()
         asked: list[None] = []
         outcome = registrar.search(window, hurried=lambda: asked.append(None) or len(asked) > most)  # noqa: B023
         tried = [r for r in outcome.rejected if r.reason not in (Reason.OVER_BUDGET, Reason.REDUNDANT)]
@@ -262,11 +262,11 @@ def test_a_stored_keyframe_that_is_damaged_is_refused_and_the_others_are_tried(t
 def test_a_keyframe_that_cannot_be_stored_closes_nothing_and_is_in_no_later_ones_way() -> None:
     registrar = Registrar(PARAMS)
     _run(registrar, _frame(0, HERE, True))
-    add = registrar._store.add
-    registrar._store.add = refuse  # type: ignore[method-assign]
+    add = registrar._store.write_keyframe
+    registrar._store.write_keyframe = refuse  # type: ignore[method-assign]
     with pytest.raises(StoreError, match="disk"):
         _run(registrar, _frame(30, BESIDE, True))
-    registrar._store.add = add  # type: ignore[method-assign]
+    registrar._store.write_keyframe = add  # type: ignore[method-assign]
     closures, _ = _run(registrar, _frame(30.5, HERE, True))
     assert [closure.from_ns for closure in closures] == [0]
 
@@ -278,7 +278,7 @@ def refuse(*_: object) -> None:
 def test_a_keyframe_of_before_a_reset_is_not_stored_after_it() -> None:
     registrar = Registrar(PARAMS)
     registrar.track(_frame(0, HERE, True))
-    (window,) = registrar.end()
+    (window,) = registrar.end_windows()
     registrar.reset()
     assert registrar.search(window).keyframe_ns is None
     _run(registrar, _frame(10, HERE, True))
@@ -396,7 +396,7 @@ def test_what_nobody_confirms_is_refused_at_the_end_and_at_once_without_time_to_
         registrar = Registrar(params, method=Odometrical(30))
         for frame in _passes(0.0):
             registrar.process(frame)
-        (window,) = registrar.end()
+        (window,) = registrar.end_windows()
         outcome = registrar.search(window)
         assert outcome.closures == () and registrar.waiting == waiting
         rejected = (*outcome.rejected, *registrar.settle().rejected)
@@ -423,12 +423,12 @@ def test_a_moment_of_which_fusion_leaves_no_object_is_no_keyframe(monkeypatch: p
 
 def test_live_parameters_hold_from_the_next_frame_and_the_next_search_on() -> None:
     registrar = Registrar(PARAMS)
-    registrar.adopt(PARAMS.replaced(keyframe_translation=9.0, keyframe_rotation=180.0, keyframe_seconds=99.0))
+    registrar.use_parameters(PARAMS.replaced(keyframe_translation=9.0, keyframe_rotation=180.0, keyframe_seconds=99.0))
     assert registrar.track(_frame(0, HERE, True)) is None and registrar.track(_frame(1, AWAY, True)) is None
-    registrar.adopt(PARAMS)
+    registrar.use_parameters(PARAMS)
     window = registrar.track(_frame(2, BESIDE, True))
     registrar.search(window)
-    registrar.adopt(PARAMS.replaced(min_gap=60.0))
+    registrar.use_parameters(PARAMS.replaced(min_gap=60.0))
     closures, rejected = _run(registrar, _frame(50, HERE, True))
     assert not closures and {refusal.reason for refusal in rejected} == {Reason.NO_CANDIDATE}
 
@@ -443,7 +443,7 @@ def test_odds_that_are_asked_for_live_hold_for_our_gate_and_leave_one_of_ones_ow
     for gate, found in ((None, 0), (welcoming, 1)):
         registrar = Registrar(PARAMS, gate=gate)
         registrar.process(_frame(0, HERE))
-        registrar.adopt(PARAMS.replaced(least_odds=1e6))
+        registrar.use_parameters(PARAMS.replaced(least_odds=1e6))
         assert len(_run(registrar, _frame(30, BESIDE))[0]) == found
     assert asked
 
@@ -484,15 +484,15 @@ def _arrived(registrar: Registrar, seconds: float, T: Array, robot: str, run: st
     """What becomes of a keyframe that a robot has made by itself."""
     elsewhere = Registrar(PARAMS)
     elsewhere.track(_of(robot, _frame(seconds, T, True)))
-    (window,) = elsewhere.end()
+    (window,) = elsewhere.end_windows()
     elsewhere.close()
-    return registrar.receive(Arrival(fuse(window, PARAMS), window.clock, run))
+    return registrar.receive_keyframe(Arrival(fuse(window, PARAMS), window.clock, run))
 
 
 def test_of_a_keyframe_from_elsewhere_without_objects_nothing_comes() -> None:
     registrar = Registrar(PARAMS)
     bare = replace(rooms.keyframe(HERE), objects=(), robot="robot1")
-    assert registrar.receive(Arrival(bare, Clock(0, 0), "a")) == Outcome()
+    assert registrar.receive_keyframe(Arrival(bare, Clock(0, 0), "a")) == Outcome()
     assert registrar.counts()["keyframes"] == 0
 
 

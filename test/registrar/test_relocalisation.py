@@ -49,14 +49,14 @@ class Pass:
         self.relocalisation = Relocalisation()
 
     def go(self, metres: float, session: int = NOW, seconds: float | None = None) -> None:
-        self.relocalisation.follow(frame(100.0 + metres if seconds is None else seconds, moved(metres)), session)
+        self.relocalisation.note_frame(frame(100.0 + metres if seconds is None else seconds, moved(metres)), session)
 
     def close(self, metres: float, odds: float = 100.0, wrong: Array | None = None, earlier: int = EARLIER) -> None:
         self.go(metres)
         source = place(NOW, 100.0 + metres, moved(metres), metres)
         target = place(earlier, 10.0 + metres, T_MAP_ODOM @ moved(metres + 0.2), metres)
         T_target_source = moved(-0.2) @ (np.eye(4) if wrong is None else wrong)
-        self.relocalisation.receive(closure(source, target, T_target_source, odds), source, target)
+        self.relocalisation.add_closure(closure(source, target, T_target_source, odds), source, target)
 
 
 def closure(source: Keyframe, target: Keyframe, T: Array, odds: float) -> LoopClosure:
@@ -105,7 +105,7 @@ def test_one_that_is_very_likely_or_that_others_confirmed_is_enough(walk: Pass) 
     other.go(0.0)
     source, target = place(NOW, 100.0, np.eye(4), 0.0), place(EARLIER, 10.0, np.eye(4), 0.0)
     one = closure(source, target, np.eye(4), 10.0)
-    other.relocalisation.receive(replace(one, evidence={"odds": 10.0, "agreeing": 3.0}), source, target)
+    other.relocalisation.add_closure(replace(one, evidence={"odds": 10.0, "agreeing": 3.0}), source, target)
     assert other.relocalisation.relocalised is not None
 
 
@@ -163,7 +163,7 @@ def test_a_search_that_ends_after_a_silence_tells_of_odometry_that_is_over(walk:
     walk.go(0.0)
     walk.go(0.0, seconds=101.0 + SILENCE_S)
     source, target = place(NOW, 100.0, np.eye(4), 0.0), place(EARLIER, 10.0, np.eye(4), 0.0)
-    walk.relocalisation.receive(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
+    walk.relocalisation.add_closure(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
     assert walk.relocalisation.relocalised is None
 
 
@@ -171,7 +171,7 @@ def test_the_way_since_the_keyframe_counts_when_its_search_ends_later(walk: Pass
     for step, metres in enumerate((0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 1.0)):
         walk.go(metres, seconds=100.0 + step)
     source, target = place(NOW, 101.0, moved(1.0), 1.0), place(EARLIER, 10.0, T_MAP_ODOM @ moved(1.0), 1.0)
-    walk.relocalisation.receive(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
+    walk.relocalisation.add_closure(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
     found = walk.relocalisation.relocalised
     assert found is not None and np.allclose(np.diag(found.covariance), np.diag(TIGHT + drift(8.0)))
     for step in range(1, 6):
@@ -182,10 +182,10 @@ def test_the_way_since_the_keyframe_counts_when_its_search_ends_later(walk: Pass
 
 def test_without_odometry_the_newest_keyframe_is_told() -> None:
     relocalisation = Relocalisation()
-    relocalisation.follow(frame(100.0, None), NOW)
+    relocalisation.note_frame(frame(100.0, None), NOW)
     source = replace(place(NOW, 100.0, moved(0.3), 0.3), by_odometry=False)
     target = place(EARLIER, 10.0, T_MAP_ODOM, 0.0)
-    relocalisation.receive(closure(source, target, moved(0.1), ALONE_ODDS), source, target)
+    relocalisation.add_closure(closure(source, target, moved(0.1), ALONE_ODDS), source, target)
     found = relocalisation.relocalised
     assert found is not None and found.stamp_ns == source.stamp_ns
     assert np.allclose(found.T_map_camera, T_MAP_ODOM @ moved(0.1))

@@ -26,8 +26,8 @@ def store_of(file: Path, shown: Sequence[Shown], closures: Sequence[LoopClosure]
     for number, (seconds, session, objects) in enumerate(shown, start=1):
         taken = keyframe(number, seconds, objects, session, moved(0.0))
         named, merged = landmarks.assign(sightings_of(taken))
-        store.add(taken, named, closures if number == len(shown) else (), merged)
-        landmarks.add(named, merged)
+        store.write_keyframe(taken, named, closures if number == len(shown) else (), merged)
+        landmarks.add_sightings(named, merged)
     store.close()
     return file
 

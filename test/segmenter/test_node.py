@@ -131,7 +131,7 @@ def test_depth_of_another_sensor_is_brought_into_the_picture_of_colour(
     met = spied(camera, monkeypatch)
     T_colour_depth = np.eye(4)
     T_colour_depth[0, 3] = -0.12
-    camera.node._pipeline.frames.receive(said(transform("colour_eye", "depth_eye", T_colour_depth)))
+    camera.node._pipeline.frames.add_transforms(said(transform("colour_eye", "depth_eye", T_colour_depth)))
     of_colour = replace(CAMERA, fx=600.0, fy=600.0, cx=319.5, cy=239.5, width=640, height=480)
     info = camera.peer.create_publisher(CameraInfo, "colour/camera_info", qos.stage())
     camera.wait(lambda: info.get_subscription_count() > 0)

@@ -60,7 +60,7 @@ def written(recording: Path, plan: RecordingPlan = STORY, *images: Rendering) ->
     """The truth of a story, written and read again; by default of two frames, with the book in both."""
     writer = TruthWriter(plan, "loop", 7, CAMERA)
     for k, image in enumerate(images or (rendering(*BEFORE.objects[:2]), rendering(*AFTER.objects))):
-        writer.add(STAMPS[k], int(plan.scene_of[k]), image)
+        writer.write_frame(STAMPS[k], int(plan.scene_of[k]), image)
     recording.mkdir(exist_ok=True)
     writer.write(recording)
     return read_truth(recording)

@@ -51,7 +51,7 @@ class CameraStream:
         """The frame with the odometry around it, if that is this camera's, and with the doubt there is."""
         seat, T_body_camera = self._known_mount(frame, odometry)
         known = np.eye(4) if seat is Seat.ONE_PLACE else T_body_camera
-        self._monitor.follow(frame.stamp_ns, frame.view, frame.frame_id, known, has_odometry=bool(odometry))
+        self._monitor.follow_view(frame.stamp_ns, frame.view, frame.frame_id, known, has_odometry=bool(odometry))
         if seat is Seat.UNKNOWN:
             T_body_camera = self._measured_mount()
         unusable = seat is Seat.BEYOND or (seat is Seat.UNKNOWN and T_body_camera is None) or self._monitor.disowned
@@ -61,9 +61,9 @@ class CameraStream:
         placed = from_msg.followed(frame, used, T_body_camera)
         return replace(placed, doubt=self._monitor.doubt, proven=self._monitor.proven)
 
-    def finish(self) -> str:
+    def judge_rest(self) -> str:
         """Look at what has come by the end of a recording; the doubt there is of the camera, "" for none."""
-        self._monitor.finish()
+        self._monitor.judge_rest()
         return self._monitor.doubt
 
     def _known_mount(self, frame: Frame, odometry: Sequence[Odometry] | None) -> tuple[Seat, Array | None]:

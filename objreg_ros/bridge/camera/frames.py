@@ -68,7 +68,7 @@ class FrameEdge:
             return FrameTie.STATIC
         return FrameTie.MOVING if self.moves else FrameTie.CONSTANT
 
-    def add(self, stamp_ns: int, sample: Sample) -> None:
+    def add_sample(self, stamp_ns: int, sample: Sample) -> None:
         """Another sample. One that is not newer is left out; time that jumps back begins the history anew."""
         if not self.first:
             self.first = sample
@@ -126,7 +126,7 @@ class FrameTree:
         self._followed: set[str] = set()  # children whose edges have a history
         self._lock = Lock()
 
-    def receive(self, message: Any) -> None:
+    def add_transforms(self, message: Any) -> None:
         """Take a TFMessage of /tf_static in: the last transform of a frame counts.
 
         ValueError for a transform without a rotation, or beyond all measure; the others are taken.
@@ -134,7 +134,7 @@ class FrameTree:
         self._take(message, self._take_static)
 
     def receive_moving(self, message: Any) -> None:
-        """Take a TFMessage of /tf in, as `receive`. What /tf_static said of a frame and its parent stays."""
+        """Take a TFMessage of /tf in, as `add_transforms`. What /tf_static said of a frame and its parent stays."""
         self._take(message, self._take_moving)
 
     def _take(self, message: Any, take: Any) -> None:
@@ -167,7 +167,7 @@ class FrameTree:
         if edge is None:
             edge = self._edge(parent, child)
             self._follow()
-        edge.add(stamp_ns, sample)
+        edge.add_sample(stamp_ns, sample)
 
     def _edge(self, parent: str, child: str) -> FrameEdge:
         parents = self._edges.get(child, {})
@@ -178,7 +178,7 @@ class FrameTree:
             self._count += 1
         return parents[parent]
 
-    def follow(self, *names: str) -> None:
+    def keep_history(self, *names: str) -> None:
         """Keep a history of what is above these frames from now on."""
         with self._lock:
             self._ask(names)

@@ -42,7 +42,7 @@ def receive_frames(
             then(message)
 
     if wanted and TFMessage is not None:
-        node.listen(TFMessage, "/tf_static", tree.receive, qos.latched(depth=KEPT))
+        node.listen(TFMessage, "/tf_static", tree.add_transforms, qos.latched(depth=KEPT))
         node.listen(TFMessage, "/tf", receive_moving, qos.sensor(reliable=False, depth=MOVING))
     return tree
 

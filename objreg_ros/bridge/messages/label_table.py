@@ -25,7 +25,7 @@ class LabelTable:
         self._lock = threading.Lock()
         self._met: list[str] = []
 
-    def adopt(self, stated: Mapping[int, str]) -> None:
+    def adopt_table(self, stated: Mapping[int, str]) -> None:
         """Adopt a received table; names that were met and that it lacks get new numbers."""
         with self._lock:
             self.names = self._with(dict(stated), self._met)

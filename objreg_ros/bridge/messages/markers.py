@@ -40,7 +40,7 @@ class MarkerScene:
         if frame.T_odom_camera is not None:
             self._recent.append((frame.stamp_ns, frame.T_odom_camera[:3, 3]))
 
-    def settle(self, keyframe_ns: int, closures: Iterable[LoopClosure], rejected: Iterable[Rejected]) -> None:
+    def show_keyframe(self, keyframe_ns: int, closures: Iterable[LoopClosure], rejected: Iterable[Rejected]) -> None:
         """A frame became a keyframe, with these edges."""
         self._places.update(item for item in tuple(self._recent) if item[0] == keyframe_ns)
         while len(self._places) > MOST_PLACES:

@@ -42,7 +42,7 @@ class Accounting:
         self._lost: Counter[str] = Counter()
         self._stages: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=RECENT))
 
-    def receive(self, stamp_ns: int) -> None:
+    def count_frame(self, stamp_ns: int) -> None:
         """A frame came in."""
         with self._lock:
             self._received += 1

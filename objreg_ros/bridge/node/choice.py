@@ -34,7 +34,7 @@ class Choice(Generic[Subscription]):
         self._open: dict[str, Subscription] = {}
         self._open_all()
 
-    def receive(self, topic: str, message: Any) -> bool:
+    def choose_topic(self, topic: str, message: Any) -> bool:
         """Whether a message is of a topic that is open still; the first valid one decides."""
         if topic not in self._open:
             return False

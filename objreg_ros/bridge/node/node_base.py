@@ -96,12 +96,12 @@ class NodeBase(ServingNode):
         """
         raise NotImplementedError
 
-    def adopt(self) -> None:
+    def apply_parameters(self) -> None:
         """Live parameters have changed."""
 
     def _adopt_if_open(self) -> None:
         if self.is_open:
-            self.adopt()
+            self.apply_parameters()
 
     def own_diagnostics(self) -> tuple[Diagnostics, ...]:
         """What this node reports beside what nodes have in common."""
@@ -127,7 +127,7 @@ class NodeBase(ServingNode):
 
         def receive(message: Any, info: Mapping[str, Any]) -> None:
             self._note_loss(topic, missed.before(info["publication_sequence_number"]))
-            self.watch.receive(watched)
+            self.watch.note_input(watched)
             self._pass(topic, received, message)
 
         events = SubscriptionEventCallbacks(matched=partial(self._note_match, full))
@@ -137,11 +137,11 @@ class NodeBase(ServingNode):
         self, full: str, topic: str, received: Callable[[Any], None], watched: str
     ) -> LocalSubscription:
         def receive(value: Any) -> None:
-            self.watch.receive(watched)
+            self.watch.note_input(watched)
             self._pass(topic, received, value)
 
         subscription = LocalSubscription(full, self._queue, receive)
-        self.bus.add(subscription)
+        self.bus.add_subscription(subscription)
         self.connected[full] = 1
         return subscription
 
@@ -205,7 +205,7 @@ class NodeBase(ServingNode):
         """
 
         def receive(topic: str, message: Any) -> None:
-            if self._choices[name].receive(topic, message):
+            if self._choices[name].choose_topic(topic, message):
                 received(topic, message)
 
         def subscribe(topic: str) -> Subscription | LocalSubscription:
@@ -233,7 +233,7 @@ class NodeBase(ServingNode):
         """Close every topic of `listen_to_first`; its silence is no longer reported."""
         if name in self._choices:
             self._choices.pop(name).close()
-        self.watch.forget(name)
+        self.watch.unwatch(name)
 
     def expect(self, name: str, *topics: str) -> None:
         """Warn when none of ``topics`` speaks."""
@@ -247,7 +247,7 @@ class NodeBase(ServingNode):
 
     def accept(self, stamp_ns: int) -> None:
         """A frame came in; from now on it is in the counters."""
-        self.accounting.receive(stamp_ns)
+        self.accounting.count_frame(stamp_ns)
 
     def let_in(self, stamp_ns: int) -> bool:
         """Whether a frame that was accepted goes on; else it ends here: a managed node lets none in while inactive."""

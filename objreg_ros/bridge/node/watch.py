@@ -27,12 +27,12 @@ class Watch:
         self._inputs[name] = topics
         self._received_at[name] = self._clock()
 
-    def forget(self, name: str) -> None:
+    def unwatch(self, name: str) -> None:
         """Watch the input no longer, if it was."""
         self._inputs.pop(name, None)
         self._received_at.pop(name, None)
 
-    def receive(self, name: str) -> None:
+    def note_input(self, name: str) -> None:
         """The input has spoken; of an input that is not watched too."""
         if name in self._received_at:
             self._received_at[name] = self._clock()

@@ -35,7 +35,7 @@ class IntraProcessBus:
         """Whether a node of this process publishes a topic."""
         return topic in self._subscriptions
 
-    def add(self, subscription: LocalSubscription) -> None:
+    def add_subscription(self, subscription: LocalSubscription) -> None:
         """Add a subscriber of its topic; KeyError if no node of this process offers that topic."""
         self._subscriptions[subscription.topic_name].append(subscription)
 

@@ -41,7 +41,7 @@ class Acknowledgements:
         if self._followed[kind]:
             self._in_flight[kind][stamp_ns] += 1
 
-    def receive(self, text: str, stamp_ns: int) -> None:
+    def read_acknowledgement(self, text: str, stamp_ns: int) -> None:
         """An acknowledgement came; one that says nothing we know is left aside."""
         node, _, verdict = text.partition(" ")
         if node not in ORDER or not verdict:

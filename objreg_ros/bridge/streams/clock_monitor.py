@@ -64,7 +64,7 @@ class ClockMonitor(Generic[T]):
         self._held, self._last_ns = None, held[0]
         return [held]
 
-    def end(self) -> list[tuple[int, T]]:
+    def release_held(self) -> list[tuple[int, T]]:
         """What is held, since nothing more will speak against it; what leapt back is let go, and parts nothing."""
         held, self._held = self._held, None
         if held is not None and self._last_ns is not None and held[0] > self._last_ns:

@@ -27,8 +27,8 @@ class ClosuresIn:
     """The counters of ``node`` count closures. ValueError for `loop_closures` where objreg_msgs is not installed.
 
     ``take`` is given each accepted closure, ``again`` a known one that now names its sessions, ``withdraw`` the
-    `Moments` and robots of a retracted one. `forget` lets a closure come once more. ``prefixes`` has what precedes the
-    topics of each robot.
+    `Moments` and robots of a retracted one. `forget_closure` lets a closure come once more. ``prefixes`` has what
+    precedes the topics of each robot.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class ClosuresIn:
         for closure in closures:
             self._known.setdefault(closure.moments, set()).add(closure.robots)
 
-    def forget(self, closure: LoopClosure) -> None:
+    def forget_closure(self, closure: LoopClosure) -> None:
         """The closure was not taken: in another form, or later, it may be."""
         left = self._known.pop(closure.moments, set()) - {closure.robots}
         if left:

@@ -55,7 +55,7 @@ class DetectionsIn:
     def _on_labels(self, message: Any) -> None:
         names = self._node.read_aside("labels", from_msg.labels, message)
         if names is not None:
-            self._labels.adopt(names)
+            self._labels.adopt_table(names)
             self._shared = names
             self._node.feed("labels", 0, self._labels.names)
 

@@ -36,7 +36,7 @@ class FairQueue(Generic[Item]):
                 del self._queues[fullest]
             return False
 
-    def take(self) -> Item:
+    def take_next(self) -> Item:
         """The oldest item of the sender whose turn it is; IndexError where none waits."""
         with self._lock:
             if not self._queues:

@@ -27,8 +27,8 @@ class FrameOrder:
         self._lock = threading.Lock()
         self._line: deque[_Place] = deque()
 
-    def begin(self, stamp_ns: int) -> None:
-        """A frame came that will `end`."""
+    def begin_frame(self, stamp_ns: int) -> None:
+        """A frame came that will have its `end_frame`."""
         with self._lock:
             self._line.append(_Place(stamp_ns))
 
@@ -38,7 +38,7 @@ class FrameOrder:
             self._line.append(_Place(stamp_ns, frame_id))
             self._advance()
 
-    def end(self, stamp_ns: int) -> None:
+    def end_frame(self, stamp_ns: int) -> None:
         """A frame that began has ended."""
         with self._lock:
             at_work = (place for place in self._line if place.stamp_ns == stamp_ns and place.frame_id is None)

@@ -65,7 +65,9 @@ class FramesNode(SynchronisedNode):
             self.listen(kind, topic, self._receive(topic), qos.stage(), watched=topic)
         self.expect("objects", "objects")
         exact = [Stream(topic) for topic in topics]
-        self.begin([*exact, Stream("labels", Need.LATCHED), *odometry_streams(odom_slop, joints=is_installed())])
+        self.start_matching(
+            [*exact, Stream("labels", Need.LATCHED), *odometry_streams(odom_slop, joints=is_installed())]
+        )
 
     def _listen_to_odometry(self) -> None:
         for topic, kind in ODOMETRY.items():
@@ -141,7 +143,7 @@ class FramesNode(SynchronisedNode):
         def look() -> None:
             if time.monotonic() - self._seen_s > SILENT_S:
                 self._seen_s = math.inf
-                self.aside(lambda: work(self._stream.finish()))
+                self.aside(lambda: work(self._stream.judge_rest()))
 
         self.create_timer(LOOK_S, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 

@@ -130,7 +130,7 @@ class Player(Node):
     def _receive(self, acknowledgement: Header) -> None:
         self._received = time.monotonic()
         if self._acknowledgements is not None:
-            self._acknowledgements.receive(acknowledgement.frame_id, headers.stamp_ns(acknowledgement))
+            self._acknowledgements.read_acknowledgement(acknowledgement.frame_id, headers.stamp_ns(acknowledgement))
 
     # Play
 

@@ -158,7 +158,7 @@ class Queue:
         """Whether an item of the reference at a time would have this one for its match, and no other may."""
         return self.stream.need is Need.REQUIRED and self.nearest(stamp_ns) is item
 
-    def receive(self, item: QueuedMessage) -> None:
+    def enqueue(self, item: QueuedMessage) -> None:
         """Take an item in."""
         self.period_ns = None if self.last_ns is None else item.stamp_ns - self.last_ns
         self.last_ns = item.stamp_ns
@@ -202,7 +202,7 @@ class Queue:
 
 
 class Synchroniser:
-    """Matches the items of several streams. `add` returns the matches that an item completes, in order of time.
+    """Matches the items of several streams. `add_item` returns the matches that an item completes, in order of time.
 
     A stream whose stamps go back by `JUMP_NS`, two of them, has jumped in time (a looped bag): what waits with a later
     stamp is dropped as ``time_jump``, in every stream, and matching starts afresh. One alone is an ``odd_stamp``.
@@ -219,7 +219,7 @@ class Synchroniser:
         self._others = [queue for queue in self.queues.values() if queue is not self._reference]
         self._partners_first = [*self._others, self._reference]  # lest a match goes without what it need not have
 
-    def add(self, name: str, stamp_ns: int, payload: Any) -> list[Match]:
+    def add_item(self, name: str, stamp_ns: int, payload: Any) -> list[Match]:
         """Take one item of a stream; KeyError for a stream that was not named."""
         queue = self.queues[name]
         queue.received += 1
@@ -236,7 +236,7 @@ class Synchroniser:
         if queue.last_ns is not None and stamp_ns < queue.last_ns:
             self._forget_after(stamp_ns)
         queue.drop_after(stamp_ns)  # another stream's jump may have left what lies in the future of this one's
-        queue.receive(QueuedMessage(stamp_ns, payload))
+        queue.enqueue(QueuedMessage(stamp_ns, payload))
         return [*self._matches(), *self._make_space(queue)]
 
     def believe(self, passed_ns: int) -> list[Match]:
@@ -256,7 +256,7 @@ class Synchroniser:
 
     def flush(self) -> list[Match]:
         """The matches that are still possible when nothing more will come; the rest is dropped as unmatched."""
-        ended = [(queue, item) for queue in self._partners_first for item in queue.clock.end()]
+        ended = [(queue, item) for queue in self._partners_first for item in queue.clock.release_held()]
         found = [match for queue, item in ended for match in self._take(queue, *item)]
         while self._reference.items:
             found += self._resolve(self._reference.items[0])

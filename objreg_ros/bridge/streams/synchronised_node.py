@@ -27,8 +27,8 @@ Early = tuple[int, str, int, Any]  # order of arrival, stream, stamp, payload
 class SynchronisedNode(NodeBase):
     """Hands a `Match` to the worker for every message of the first stream that found its partners.
 
-    That first stream is what the counters count. `begin` says how streams are matched; the newest `EARLY` messages that
-    each stream was fed before then wait.
+    That first stream is what the counters count. `start_matching` says how streams are matched; the newest
+    `EARLY` messages that each stream was fed before then wait.
     """
 
     def prepare(self) -> None:
@@ -41,7 +41,7 @@ class SynchronisedNode(NodeBase):
         self._received, self._quiet_s = 0, 0.0  # messages of all streams, and since when no more
         self.create_timer(ALONE_S, self._look_after, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def begin(self, streams: Sequence[Stream]) -> None:
+    def start_matching(self, streams: Sequence[Stream]) -> None:
         """Start matching; what was fed to streams that are not among these is forgotten.
 
         Where streams were matched before, those frames end by what has come, and latched values stay.
@@ -69,7 +69,7 @@ class SynchronisedNode(NodeBase):
         elif name in self._sync.queues:
             if name == self._reference:
                 self.accept(stamp_ns)
-            self._hand_over(self._sync.add(name, stamp_ns, payload))
+            self._hand_over(self._sync.add_item(name, stamp_ns, payload))
 
     def _look_after(self) -> None:
         """Hand over the frames that wait for a message that may never come. A timer calls this every `ALONE_S`.

@@ -52,7 +52,7 @@ class Pending:
     def __contains__(self, name: object) -> bool:
         return any(moment[0] == name for moment, _ in self._asked)
 
-    def add(self, asked: KeyframeRequest) -> bool:
+    def add_request(self, asked: KeyframeRequest) -> bool:
         """Whether it may wait: of too many the newest of the run that has most does not."""
         for key in [k for k, one in self._asked.items() if asked.since - one.since > ASKED_S]:
             self._drop(key)
@@ -71,7 +71,7 @@ class Pending:
         wanted = name, stamp_ns, session, frame_id
         return [asked for (moment, _), asked in self._asked.items() if moment == wanted]
 
-    def forget(self, asked: KeyframeRequest) -> None:
+    def remove_request(self, asked: KeyframeRequest) -> None:
         """Its answer came, and was the right one."""
         self._asked.pop(asked.key, None)
 

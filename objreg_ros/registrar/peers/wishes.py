@@ -34,7 +34,7 @@ class Wishes:
         """How many keyframes are waited for."""
         return len({number for queue in self._queues.values() for number in queue})
 
-    def add(self, asker: str, number: int, votes: float, now: float) -> None:
+    def add_wish(self, asker: str, number: int, votes: float, now: float) -> None:
         """One more request; repeated, it counts once. Of too many goes the least promising of who has most."""
         if asker and now - self._answered.get((asker, number), -np.inf) < AGAIN_S:
             self._counters["dropped: answered before"] += 1
@@ -53,7 +53,7 @@ class Wishes:
         for asker, number in late:
             self._give_up(asker, number, "waited too long")
 
-    def take(self, now: float) -> int | None:
+    def next_wish(self, now: float) -> int | None:
         """The most promising keyframe of the asker whose turn it is; one answer is for all who asked. None if none."""
         if not self._queues:
             return None

@@ -59,7 +59,7 @@ class AttitudeFilter:
         self._frame_id = ""
         self._has_turned = False  # whether the gyroscope ever gave more than zeros, which stand for none too
 
-    def receive(self, sample: ImuSample) -> FeltGravity | None:
+    def add_imu(self, sample: ImuSample) -> FeltGravity | None:
         """Take a sample in; the direction at its stamp, at most one every 8 ms, and None where none is due or known."""
         if not self._go(sample):
             return None

@@ -27,7 +27,7 @@ class Imu(AttitudeFilter):
         self._T_camera_imu, self._find = T_camera_imu, find
 
     def in_camera(self, felt: FeltGravity, camera_frame: str) -> FeltGravity | None:
-        """A direction of `receive` in the axes of the camera; None, counted as ``unknown_frame``, where it has none.
+        """A direction of `add_imu` in the axes of the camera; None, counted as ``unknown_frame``, where it has none.
 
         The deviation is the same.
         """

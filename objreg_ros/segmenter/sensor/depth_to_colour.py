@@ -76,7 +76,7 @@ class DepthToColour:
         )
         return f"{mean} deg about x y z, {spread} from frame to frame"
 
-    def forget(self) -> None:
+    def forget_stream(self) -> None:
         """Begin with another stream."""
         self.mean, self.spread, self.frames = np.zeros(3), np.full(3, FIRST_SIGMA), 0
         self.found = None
@@ -96,7 +96,7 @@ class DepthToColour:
         """The offset of a frame, by its edges and by the frames before; those alone where it has few edges."""
         camera = image.frame_id, image.depth.shape, _reduced(image.intrinsics, 1)
         if self._camera not in (None, camera):
-            self.forget()
+            self.forget_stream()
         self._camera = camera
         self.found = found = find_rotation(image, self.mean, self.spread)
         if found is None:

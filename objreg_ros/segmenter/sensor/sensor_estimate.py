@@ -67,7 +67,7 @@ class PictureMotion:
     _stamp_ns: int = 0
     _before: Array | None = None  # (2,) rad/s: from the frame before the last to the last
 
-    def forget(self) -> None:
+    def forget_stream(self) -> None:
         """Begin with another stream."""
         self._grey, self._before = None, None
 
@@ -110,13 +110,13 @@ class SensorEstimate:
     _camera: tuple[str, tuple[int, ...]] | None = None
     _waiting: tuple[float, Array] | None = None  # of the last frame: when it was, and its offset
 
-    def forget(self) -> None:
+    def forget_stream(self) -> None:
         """Begin with another stream."""
-        self.depth_to_colour.forget()
+        self.depth_to_colour.forget_stream()
         self._forget_own()
 
     def _forget_own(self) -> None:
-        self._motion.forget()
+        self._motion.forget_stream()
         self._turns.clear()
         self._noises.clear()
         self._seen, self._waiting = 0, None

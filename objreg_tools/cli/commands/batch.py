@@ -111,7 +111,7 @@ def _written(work: BatchWork, recordings: Sequence[Path], failures: dict[Path, E
     rows = []
     with batch_tables(work.folder) as tables:
         for row, summary in _status(work, recordings, failures):
-            tables.add(row, summary)
+            tables.add_recording(row, summary)
             rows.append(row)
     model = work.made["model"]
     made = {**work.made, "model": f"{model['name']} {model['sha256']}"}

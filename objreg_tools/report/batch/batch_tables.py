@@ -50,13 +50,13 @@ class Tables:
     def __init__(self, sheets: Mapping[str, Sheet]) -> None:
         self._sheets = sheets
 
-    def add(self, row: Row, summary: Mapping[str, Any] | None) -> None:
+    def add_recording(self, row: Row, summary: Mapping[str, Any] | None) -> None:
         """A recording with its JSON; None where it failed."""
-        self._sheets["recordings"].add(_items(asdict(row), "rejected", "stage_p50_ms"))
+        self._sheets["recordings"].add_row(_items(asdict(row), "rejected", "stage_p50_ms"))
         for item in () if summary is None else summary["constraints"]:
-            self._sheets["constraints"].add({"recording": row.recording, **_constraint(item)})
+            self._sheets["constraints"].add_row({"recording": row.recording, **_constraint(item)})
         for item in () if summary is None else summary["refusals"]:
-            self._sheets["refusals"].add({"recording": row.recording, **_pair(item)})
+            self._sheets["refusals"].add_row({"recording": row.recording, **_pair(item)})
 
 
 class Sheet:
@@ -65,7 +65,7 @@ class Sheet:
     def __init__(self, writer: Any, schema: Any) -> None:
         self._writer, self._schema, self._rows = writer, schema, list[Mapping[str, Any]]()
 
-    def add(self, row: Mapping[str, Any]) -> None:
+    def add_row(self, row: Mapping[str, Any]) -> None:
         """Take a row; what the schema does not name is left out."""
         self._rows.append(row)
         if len(self._rows) >= GROUP:

@@ -94,10 +94,12 @@ def cloud_of(
             left_out += 1
             continue
         grey = keyframe.view.grey
-        cloud.add(T_map_camera, keyframe.view.xyz, None if grey is None else np.repeat(grey[..., None], 3, axis=2))
+        cloud.add_points(
+            T_map_camera, keyframe.view.xyz, None if grey is None else np.repeat(grey[..., None], 3, axis=2)
+        )
         for item in keyframe.objects:
             if item.cloud.rgb is not None:
-                cloud.add(T_map_camera, item.cloud.xyz, item.cloud.rgb, OF_AN_OBJECT)
+                cloud.add_points(T_map_camera, item.cloud.xyz, item.cloud.rgb, OF_AN_OBJECT)
     if left_out:
         notify(
             f"{left_out} keyframes of the store are not on the map: they are of another run, or not of the trajectory"

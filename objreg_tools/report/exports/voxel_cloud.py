@@ -26,7 +26,7 @@ class VoxelCloud:
         self.voxel, self._most = voxel, most
         self._rows, self._new, self._waiting = np.zeros((0, 8)), list[Array](), 0
 
-    def add(self, T_map_camera: Array, xyz: Array, rgb: Array | None = None, sureness: float = 1.0) -> None:
+    def add_points(self, T_map_camera: Array, xyz: Array, rgb: Array | None = None, sureness: float = 1.0) -> None:
         """Take points (..., 3) m of a camera, with colours (..., 3) 0..255; those that are not finite are left out.
 
         A colour counts by its ``sureness`` in the mean of its voxel.

@@ -36,7 +36,7 @@ class Clouds:
     absent: dict[str, str] = field(default_factory=dict)
     size: int = 0
 
-    def add(self, pair: PairRow, album: Album, most_bytes: int) -> None:
+    def add_pair(self, pair: PairRow, album: Album, most_bytes: int) -> None:
         """Both clouds of a pair and its pose, or why they are absent."""
         stamps_ns = (pair.outcome.from_ns, pair.outcome.to_ns)
         seen = {stamp_ns: image for stamp_ns in stamps_ns if (image := album.at(stamp_ns)) is not None}
@@ -73,7 +73,7 @@ def clouds(pairs: Iterable[PairRow], album: Album | None, most_bytes: int = PAGE
         if LEFT_OUT in made.absent.values():
             made.absent[pair.key] = LEFT_OUT
         else:
-            made.add(pair, album, most_bytes)
+            made.add_pair(pair, album, most_bytes)
     return made
 
 

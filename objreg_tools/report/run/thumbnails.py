@@ -28,7 +28,7 @@ class Thumbnails:
     left_out: int = 0
     size: int = 0
 
-    def add(self, pair: PairRow, album: Album, most_bytes: int) -> None:
+    def add_pictures(self, pair: PairRow, album: Album, most_bytes: int) -> None:
         """Both pictures of a pair, and the second over the first by its pose; nothing where they have no place."""
         first, second = album.at(pair.outcome.from_ns), album.at(pair.outcome.to_ns)
         if first is None or second is None:
@@ -66,5 +66,5 @@ def thumbnails(pairs: Iterable[PairRow], album: Album | None, most_bytes: int = 
         if drawn.left_out:
             drawn.left_out += 1
         else:
-            drawn.add(pair, album, most_bytes)
+            drawn.add_pictures(pair, album, most_bytes)
     return drawn

@@ -55,7 +55,7 @@ class Motion:
 
 
 class Rig:
-    """The cameras of one recording: ``take`` makes a picture pair. ``seed`` is that of the recording."""
+    """The cameras of one recording: ``take_picture`` makes a picture pair. ``seed`` is that of the recording."""
 
     def __init__(self, params: RigParams, camera: Intrinsics, seed: int) -> None:
         self.params, self.camera = params, camera
@@ -70,7 +70,7 @@ class Rig:
         self.lens = SimulatedLens(camera, params.distortion) if bent else None
         self._depth_lens = SimulatedLens(self.depth_camera, params.distortion) if bent else None
 
-    def take(
+    def take_picture(
         self,
         scene: Scene,
         motion: Motion,

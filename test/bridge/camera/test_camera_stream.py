@@ -61,14 +61,14 @@ def test_a_frame_has_the_pose_of_its_camera_and_is_proven_in_time(pictures: Pict
         assert placed.T_odom_camera is not None
         degrees, centimetres = pose_error(placed.T_odom_camera, true)
         assert degrees < 0.01 and centimetres < 0.01
-    assert not first.proven and last.proven and last.doubt == "" and stream.finish() == ""
+    assert not first.proven and last.proven and last.doubt == "" and stream.judge_rest() == ""
     assert stream.without_odometry == 0 and stream.findings == ()
 
 
 def test_frames_of_a_camera_that_is_not_what_it_says_are_in_doubt(pictures: Pictures) -> None:
     stream = CameraStream(Mount(None))
     last = run(stream, pictures, None, longer(CAMERA, 1.3))[-1]
-    assert "focal length" in last.doubt and not last.proven and stream.finish() == last.doubt
+    assert "focal length" in last.doubt and not last.proven and stream.judge_rest() == last.doubt
 
 
 def test_odometry_of_another_robot_is_left_out_once_it_is_known_to_be(pictures: Pictures) -> None:

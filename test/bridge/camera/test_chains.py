@@ -21,10 +21,10 @@ def at(k: int, how: str) -> np.ndarray:
 def tree_of(*edges: tuple[str, str, str]) -> FrameTree:
     """Frames in their parents, each as it moves, with ``eye`` followed."""
     tree = FrameTree()
-    tree.follow("eye")
+    tree.keep_history("eye")
     for parent, child, how in edges:
         if how == STATIC:
-            tree.receive(said(transform(parent, child, moved(1))))
+            tree.add_transforms(said(transform(parent, child, moved(1))))
     for k in range(4):
         moving = [transform(p, c, at(k, how), k * SECOND) for p, c, how in edges if how != STATIC]
         tree.receive_moving(said(*moving))
@@ -102,5 +102,5 @@ def test_odometry_without_a_child_is_of_the_frame_by_which_the_camera_hangs_or_o
 
 def test_two_bases_straight_above_each_other_are_one_to_odometry() -> None:
     tree = tree_of(("base_link", "eye", STATIC))
-    tree.receive(said(transform("base_footprint", "base_link", pose(np.eye(3), np.array([0.0, 0.0, 0.07])))))
+    tree.add_transforms(said(transform("base_footprint", "base_link", pose(np.eye(3), np.array([0.0, 0.0, 0.07])))))
     assert body_of(tree, "odom", "eye") == "base_link"

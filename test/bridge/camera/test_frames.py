@@ -13,8 +13,8 @@ from objreg_ros.bridge.camera.frames import FrameTie, FrameTree, is_world
 
 def test_two_frames_of_one_tree_are_tied_up_and_down() -> None:
     frames = FrameTree()
-    frames.receive(said(transform("base", "camera", moved(1)), transform("camera", "camera_optical", moved(2))))
-    frames.receive(said(transform("/base", "/imu", moved(3))))
+    frames.add_transforms(said(transform("base", "camera", moved(1)), transform("camera", "camera_optical", moved(2))))
+    frames.add_transforms(said(transform("/base", "/imu", moved(3))))
     expected = np.linalg.inv(moved(1) @ moved(2)) @ moved(3)
     T = frames.between("camera_optical", "imu")
     assert T is not None and pytest.approx(expected, abs=1e-9) == T
@@ -24,16 +24,16 @@ def test_two_frames_of_one_tree_are_tied_up_and_down() -> None:
 
 def test_frames_that_nothing_ties_are_not_guessed() -> None:
     frames = FrameTree()
-    frames.receive(said(transform("base", "camera", moved(1)), transform("map", "imu", moved(2))))
+    frames.add_transforms(said(transform("base", "camera", moved(1)), transform("map", "imu", moved(2))))
     assert frames.between("camera", "imu") is None and frames.between("nowhere", "camera") is None
 
 
 def test_the_last_word_on_a_frame_counts_and_a_ring_is_no_end() -> None:
     ring = FrameTree()
-    ring.receive(said(transform("a", "b", moved(1)), transform("b", "a", moved(2))))
+    ring.add_transforms(said(transform("a", "b", moved(1)), transform("b", "a", moved(2))))
     assert ring.between("c", "a") is None and ring.between("a", "b") is not None
     frames = FrameTree()
-    frames.receive(said(transform("a", "b", moved(1)), transform("a", "b", moved(3))))
+    frames.add_transforms(said(transform("a", "b", moved(1)), transform("a", "b", moved(3))))
     assert frames.between("a", "b") == pytest.approx(moved(3), abs=1e-9)
 
 
@@ -46,7 +46,7 @@ def test_a_transform_that_is_none_is_refused(wrong: str) -> None:
         one.transform.translation.x = float("nan")
     frames = FrameTree()
     with pytest.raises(ValueError, match="expected"):
-        frames.receive(said(one))
+        frames.add_transforms(said(one))
     assert frames.between("a", "b") is None
 
 
@@ -54,7 +54,7 @@ def test_a_transform_that_is_none_is_refused(wrong: str) -> None:
 def test_a_name_that_is_too_long_is_refused(names: tuple[str, str]) -> None:
     frames = FrameTree()
     with pytest.raises(ValueError, match="tf: expected at most 1000 characters, got 1001"):
-        frames.receive(said(transform(*names, moved(1))))
+        frames.add_transforms(said(transform(*names, moved(1))))
     assert frames.between(*names) is None
 
 
@@ -99,7 +99,7 @@ def test_what_tf_static_says_stays_whatever_tf_says_of_the_same_frames() -> None
 )
 def test_two_bodies_in_one_world_do_not_sit_on_each_other(world: str) -> None:
     tree = FrameTree()
-    tree.follow("eye", "base")
+    tree.keep_history("eye", "base")
     for k in range(3):
         tree.receive_moving(
             said(transform(world, "base", moved(k), k * SECOND), transform(world, "eye", moved(9 + k), k))
@@ -110,7 +110,7 @@ def test_two_bodies_in_one_world_do_not_sit_on_each_other(world: str) -> None:
 
 def test_a_frame_that_is_named_as_the_odometrys_carries_nothing_either() -> None:
     tree = FrameTree()
-    tree.receive(said(transform("start", "base", moved(1)), transform("start", "eye", moved(2))))
+    tree.add_transforms(said(transform("start", "base", moved(1)), transform("start", "eye", moved(2))))
     assert tree.between("base", "eye") is not None
     assert tree.between("base", "eye", None, "start") is None and tree.tie("base", "eye", "start") is None
 
@@ -162,7 +162,7 @@ def test_one_transform_that_is_none_leaves_the_others_of_its_message() -> None:
 
 def test_a_ring_on_tf_is_no_end() -> None:
     tree = FrameTree()
-    tree.follow("a")
+    tree.keep_history("a")
     for k in range(3):
         tree.receive_moving(
             said(transform("a", "b", moved(k), k), transform("b", "c", moved(k)), transform("c", "a", moved(k)))

@@ -16,7 +16,7 @@ def words(child: str) -> list[Odometry]:
 
 def test_the_camera_sits_on_the_body_as_the_parameter_says_else_as_the_tree_does() -> None:
     frames, said_of_it = FrameTree(), list[str]()
-    frames.receive(said(transform("base", "eye", moved(1))))
+    frames.add_transforms(said(transform("base", "eye", moved(1))))
     mount = Mount(None, frames, said_of_it.append)
     for _ in range(3):
         assert mount.T_body_camera(words("/base"), "eye") == pytest.approx(moved(1), abs=1e-9)
@@ -33,7 +33,7 @@ def test_what_nothing_ties_is_one_place_and_said_once_and_again_where_that_chang
     assert [mount.T_body_camera(words("base"), "eye") for _ in range(3)] == [None] * 3
     (text,) = said_of_it
     assert "ties the odometry's 'base' to the camera's 'eye': the registrar measures it" in text
-    frames.receive(said(transform("base", "eye", moved(1))))
+    frames.add_transforms(said(transform("base", "eye", moved(1))))
     assert mount.T_body_camera(words("base"), "eye") is not None and len(said_of_it) == 2
 
 
@@ -80,7 +80,7 @@ def robot(*names: str) -> FrameTree:
     """A chain of frames, each static in the one before it."""
     tree = FrameTree()
     for k in range(1, len(names)):
-        tree.receive(said(transform(names[k - 1], names[k], moved(k))))
+        tree.add_transforms(said(transform(names[k - 1], names[k], moved(k))))
     return tree
 
 

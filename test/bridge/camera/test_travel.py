@@ -11,7 +11,7 @@ from objreg_ros.geometry import pose
 
 def test_the_odometry_of_tf_comes_at_its_own_stamps_once_the_camera_is_known() -> None:
     tree = FrameTree()
-    tree.receive(said(transform("base", "eye", moved(1))))
+    tree.add_transforms(said(transform("base", "eye", moved(1))))
     travel, samples = Travel(tree), []
     for k in range(4):
         T = pose(np.eye(3), np.array([0.3 * k, 0.0, 0.0]))

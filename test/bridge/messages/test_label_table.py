@@ -19,16 +19,16 @@ def test_a_name_that_is_met_gets_a_number_once() -> None:
 
 def test_names_that_were_told_keep_their_numbers_and_others_come_behind_them() -> None:
     table = LabelTable()
-    table.adopt({3: "cup"})
+    table.adopt_table({3: "cup"})
     assert table.include(["cup", "tv"]) and table.names == {3: "cup", 4: "tv"}
 
 
 def test_what_was_met_stays_when_another_table_is_told() -> None:
     table = LabelTable()
     table.include(["tv"])
-    table.adopt({0: "cup", 1: "dog"})
+    table.adopt_table({0: "cup", 1: "dog"})
     assert table.names == {0: "cup", 1: "dog", 2: "tv"}
-    table.adopt(table.names)
+    table.adopt_table(table.names)
     assert table.names == {0: "cup", 1: "dog", 2: "tv"}
 
 
@@ -56,7 +56,7 @@ def test_a_detector_that_puts_something_else_into_its_names_is_refused_and_costs
 
 def test_a_number_that_no_class_can_have_is_refused_and_nothing_changes() -> None:
     table = LabelTable()
-    table.adopt({65533: "cup"})
+    table.adopt_table({65533: "cup"})
     with pytest.raises(ValueError, match="expected numbers of at most 65533, got 65534"):
         table.include(["tv"])
     assert table.names == {65533: "cup"}

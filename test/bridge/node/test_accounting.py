@@ -17,7 +17,7 @@ def test_the_books_balance_after_every_step(steps: list[tuple[str, int]]) -> Non
     accounting, waiting = Accounting(), Counter[int]()
     for what, stamp_ns in steps:
         if what == "receive":
-            accounting.receive(stamp_ns)
+            accounting.count_frame(stamp_ns)
             waiting[stamp_ns] += 1
         elif waiting[stamp_ns]:
             waiting[stamp_ns] -= 1
@@ -30,7 +30,7 @@ def test_the_books_balance_after_every_step(steps: list[tuple[str, int]]) -> Non
 
 def test_a_frame_cannot_end_twice() -> None:
     accounting = Accounting()
-    accounting.receive(5)
+    accounting.count_frame(5)
     accounting.publish(5)
     with pytest.raises(KeyError, match="no frame of 5 ns waits"):
         accounting.drop(5, "overtaken")
@@ -39,8 +39,8 @@ def test_a_frame_cannot_end_twice() -> None:
 
 def test_two_frames_of_one_stamp_are_two_frames() -> None:
     accounting = Accounting()
-    accounting.receive(0)
-    accounting.receive(0)
+    accounting.count_frame(0)
+    accounting.count_frame(0)
     accounting.publish(0)
     assert accounting.balance().waiting == 1
     accounting.publish(0)
@@ -50,7 +50,7 @@ def test_two_frames_of_one_stamp_are_two_frames() -> None:
 def test_drops_are_counted_by_reason_and_losses_apart() -> None:
     accounting = Accounting()
     for stamp_ns, reason in enumerate(("overtaken", "malformed_image", "overtaken")):
-        accounting.receive(stamp_ns)
+        accounting.count_frame(stamp_ns)
         accounting.drop(stamp_ns, reason)
     accounting.lose("image", 4)
     counters = accounting.balance()
@@ -63,7 +63,7 @@ def test_percentiles_are_those_of_the_durations() -> None:
 
 def test_a_stage_is_measured_and_the_way_from_in_to_out_too() -> None:
     accounting = Accounting()
-    accounting.receive(1)
+    accounting.count_frame(1)
     with accounting.timed("detect"):
         pass
     accounting.publish(1)

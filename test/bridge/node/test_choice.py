@@ -41,43 +41,43 @@ def test_every_topic_is_open_until_one_is_taken(hall: Hall) -> None:
 
 
 def test_the_first_valid_message_decides_and_the_others_are_closed(hall: Hall) -> None:
-    assert hall.choice.receive("packed", "good")
+    assert hall.choice.choose_topic("packed", "good")
     assert hall.choice.taken == "packed" and hall.open == ["packed"]
-    assert not hall.choice.receive("raw", "good")
+    assert not hall.choice.choose_topic("raw", "good")
 
 
 def test_junk_decides_nothing_and_is_handed_on_to_be_counted(hall: Hall) -> None:
-    assert hall.choice.receive("packed", "junk")
+    assert hall.choice.choose_topic("packed", "junk")
     assert hall.choice.taken is None and hall.open == ["raw", "packed"]
-    assert hall.choice.receive("raw", "good") and hall.choice.taken == "raw"
+    assert hall.choice.choose_topic("raw", "good") and hall.choice.taken == "raw"
 
 
 def test_once_a_topic_is_taken_junk_on_it_changes_nothing(hall: Hall) -> None:
-    hall.choice.receive("raw", "good")
-    assert hall.choice.receive("raw", "junk") and hall.choice.taken == "raw"
+    hall.choice.choose_topic("raw", "good")
+    assert hall.choice.choose_topic("raw", "junk") and hall.choice.taken == "raw"
 
 
 def test_a_topic_that_falls_silent_makes_room_for_whichever_speaks_next(hall: Hall) -> None:
-    hall.choice.receive("raw", "good")
+    hall.choice.choose_topic("raw", "good")
     hall.clock.now += 4.9
     hall.choice.look()
     assert hall.open == ["raw"]
     hall.clock.now += 0.1
     hall.choice.look()
     assert hall.choice.taken is None and sorted(hall.open) == ["packed", "raw"]
-    assert hall.choice.receive("packed", "good") and hall.open == ["packed"]
+    assert hall.choice.choose_topic("packed", "good") and hall.open == ["packed"]
 
 
 def test_a_topic_that_speaks_again_after_a_silence_is_taken_again(hall: Hall) -> None:
-    hall.choice.receive("raw", "good")
+    hall.choice.choose_topic("raw", "good")
     hall.clock.now += 6.0
     hall.choice.look()
-    assert hall.choice.receive("raw", "good") and hall.open == ["raw"]
+    assert hall.choice.choose_topic("raw", "good") and hall.open == ["raw"]
 
 
 def test_a_topic_that_goes_on_speaking_keeps_its_place(hall: Hall) -> None:
     for _ in range(4):
-        hall.choice.receive("raw", "good")
+        hall.choice.choose_topic("raw", "good")
         hall.clock.now += 4.0
         hall.choice.look()
     assert hall.choice.taken == "raw"
@@ -86,4 +86,4 @@ def test_a_topic_that_goes_on_speaking_keeps_its_place(hall: Hall) -> None:
 def test_a_choice_that_is_closed_has_no_subscriptions(hall: Hall) -> None:
     hall.choice.close()
     hall.choice.close()
-    assert hall.open == [] and not hall.choice.receive("raw", "good")
+    assert hall.open == [] and not hall.choice.choose_topic("raw", "good")

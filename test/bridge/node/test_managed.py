@@ -42,7 +42,7 @@ class Shop(NodeBase):
         if self.at_the_end is not None:
             raise self.at_the_end
 
-    def adopt(self) -> None:
+    def apply_parameters(self) -> None:
         self.notes.append("adopted")
 
 

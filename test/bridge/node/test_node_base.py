@@ -232,7 +232,7 @@ def test_a_message_that_does_not_decode_closes_no_topic(node: NodeBase) -> None:
 def test_the_other_topics_are_opened_again_once_the_one_that_was_taken_is_silent(node: NodeBase) -> None:
     node.listen_to_first("words", WORDS, decode, lambda *_: None, qos.stage())
     choice = node._choices["words"]
-    choice.receive("loud", String(data="one"))
+    choice.choose_topic("loud", String(data="one"))
     assert node.count_subscribers("/quiet") == 0
     choice._clock = lambda: time.monotonic() + 5.0
     node._report()

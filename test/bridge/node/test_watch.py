@@ -24,7 +24,7 @@ def test_an_input_that_speaks_in_time_is_not_reported() -> None:
     watch, clock = watched({})
     clock.now = 4.9
     assert watch.silent() == {}
-    watch.receive("depth")
+    watch.note_input("depth")
     clock.now = 9.8
     assert watch.silent() == {}
 
@@ -45,14 +45,14 @@ def test_a_silent_input_with_a_publisher_is_told_to_look_at_its_qos() -> None:
 
 def test_an_input_that_is_not_watched_may_speak() -> None:
     watch, clock = watched({})
-    watch.receive("odom")
+    watch.note_input("odom")
     clock.now = 7.0
     assert set(watch.silent()) == {"depth"}
 
 
 def test_a_forgotten_input_may_be_silent() -> None:
     watch, clock = watched({})
-    watch.forget("depth")
-    watch.forget("odom")
+    watch.unwatch("depth")
+    watch.unwatch("odom")
     clock.now = 7.0
     assert watch.silent() == {}

@@ -9,10 +9,10 @@ from objreg_ros.bridge.streams.acknowledgements import DEPTH, IMAGE, ORDER, Ackn
 def test_depth_is_through_when_the_last_node_has_published_it() -> None:
     acknowledgements = Acknowledgements(ORDER)
     acknowledgements.send(DEPTH, 5)
-    acknowledgements.receive("detector published", 5)
-    acknowledgements.receive("segmenter published", 5)
+    acknowledgements.read_acknowledgement("detector published", 5)
+    acknowledgements.read_acknowledgement("segmenter published", 5)
     assert acknowledgements.waiting(DEPTH) == 1
-    acknowledgements.receive("registrar published", 5)
+    acknowledgements.read_acknowledgement("registrar published", 5)
     assert acknowledgements.waiting(DEPTH) == 0
 
 
@@ -20,23 +20,23 @@ def test_an_image_is_through_when_the_detector_is_done_with_it() -> None:
     acknowledgements = Acknowledgements(ORDER)
     for stamp_ns, verdict in ((4, "detector published"), (5, "detector dropped malformed_image")):
         acknowledgements.send(IMAGE, stamp_ns)
-        acknowledgements.receive("segmenter published", stamp_ns)
+        acknowledgements.read_acknowledgement("segmenter published", stamp_ns)
         assert acknowledgements.waiting(IMAGE) == 1
-        acknowledgements.receive(verdict, stamp_ns)
+        acknowledgements.read_acknowledgement(verdict, stamp_ns)
         assert acknowledgements.waiting(IMAGE) == 0
 
 
 def test_depth_that_is_dropped_on_the_way_is_through() -> None:
     acknowledgements = Acknowledgements(ORDER)
     acknowledgements.send(DEPTH, 5)
-    acknowledgements.receive("segmenter dropped unmatched", 5)
+    acknowledgements.read_acknowledgement("segmenter dropped unmatched", 5)
     assert acknowledgements.waiting(DEPTH) == 0 and acknowledgements.outcomes["segmenter"] == {"dropped unmatched": 1}
 
 
 def test_the_last_node_that_is_there_is_the_end() -> None:
     acknowledgements = Acknowledgements({"segmenter", "detector", "mapper"})
     acknowledgements.send(DEPTH, 5)
-    acknowledgements.receive("segmenter published", 5)
+    acknowledgements.read_acknowledgement("segmenter published", 5)
     assert acknowledgements.waiting(DEPTH) == 0
 
 
@@ -51,7 +51,7 @@ def test_the_same_stamp_may_be_on_its_way_twice() -> None:
     acknowledgements = Acknowledgements(ORDER)
     acknowledgements.send(DEPTH, 5)
     acknowledgements.send(DEPTH, 5)
-    acknowledgements.receive("registrar published", 5)
+    acknowledgements.read_acknowledgement("registrar published", 5)
     assert acknowledgements.waiting(DEPTH) == 1
 
 
@@ -66,7 +66,7 @@ def test_receipts_of_what_was_not_sent_or_of_strangers_are_left_aside() -> None:
     acknowledgements = Acknowledgements(ORDER)
     acknowledgements.send(DEPTH, 5)
     for text in ("registrar published", "mapper published", "registrar", ""):
-        acknowledgements.receive(text, 6)
+        acknowledgements.read_acknowledgement(text, 6)
     assert acknowledgements.waiting(DEPTH) == 1 and acknowledgements.outcomes == {"registrar": {"published": 1}}
 
 

@@ -15,7 +15,7 @@ def passed(stamps: list[int]) -> tuple[list[int], list[int]]:
     alone: list[int] = []
     course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
     admitted = [stamp_ns for stamp in stamps for stamp_ns, _ in course.admit(stamp, "item")]
-    admitted += [stamp_ns for stamp_ns, _ in course.end()]
+    admitted += [stamp_ns for stamp_ns, _ in course.release_held()]
     assert not course.holding
     return admitted, alone
 

@@ -84,7 +84,7 @@ def test_equal_moments_of_two_robots_are_two_closures_and_one_is_taken_back() ->
     messages[1].retracted = True
     hearer.received["loop_closures"](messages[1])
     assert hearer.withdrawn == [(CLOSURE.moments, ("b", "b"))]
-    hearer.closures.forget(hearer.taken[0])
+    hearer.closures.forget_closure(hearer.taken[0])
     hearer.received["loop_closures"](messages[0])
     assert [told.robots for told in hearer.taken[2:]] == [("a", "a")]
 

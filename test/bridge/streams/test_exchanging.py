@@ -37,7 +37,7 @@ class Spoken:
     def awaits(self, packed: bytes) -> bool:
         return packed != b"of others"
 
-    def receive(self, packed: bytes, now: float) -> bytes | None:
+    def receive_summary(self, packed: bytes, now: float) -> bytes | None:
         if packed == b"bad":
             raise ValueError("expected a summary, got none")
         return b"ask " + packed if packed != b"unlike" else None
@@ -150,7 +150,7 @@ def test_a_flood_of_summaries_of_one_keeps_none_of_another_unread(
         def sender(self, packed: bytes) -> str:
             return packed.decode()[0]
 
-        def receive(self, packed: bytes, now: float) -> bytes | None:
+        def receive_summary(self, packed: bytes, now: float) -> bytes | None:
             begun.set()
             assert ended.wait(10.0)
             compared.append(packed)

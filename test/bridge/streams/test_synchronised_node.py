@@ -58,7 +58,7 @@ def said(node: Pairs) -> list[str]:
 
 
 def test_a_frame_goes_to_the_worker_with_its_partner_and_is_booked_as_published(node: Pairs) -> None:
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     node.feed("a", 5, "a5")
     node.feed("b", 5, "b5")
     node.wait()
@@ -69,7 +69,7 @@ def test_a_frame_goes_to_the_worker_with_its_partner_and_is_booked_as_published(
 def test_what_comes_before_it_is_known_how_to_match_is_not_lost(node: Pairs) -> None:
     node.feed("b", 5, "b5")
     node.feed("elsewhere", 5, "x")
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     node.feed("a", 5, "a5")
     node.wait()
     assert node.taken == [("a5", "b5")]
@@ -83,7 +83,7 @@ def test_several_frames_that_came_early_are_matched_in_the_order_they_came_in(no
     for stamp_ns in (3, 4, 5):
         node.feed("b", stamp_ns, f"b{stamp_ns}")
     assert not node.begun and not found
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     assert node.begun and [(match["a"], match["b"]) for match in found] == [("a3", "b3"), ("a4", "b4"), ("a5", "b5")]
     assert node.accounting.balance().dropped == {"time_jump": 1}
 
@@ -92,14 +92,14 @@ def test_what_came_once_is_not_pushed_out_by_a_busy_stream_before_matching_begin
     node.feed("names", 0, "cup")
     for stamp_ns in range(1000):
         node.feed("b", stamp_ns, f"b{stamp_ns}")
-    node.begin([Stream("a"), Stream("b"), Stream("names", Need.LATCHED)])
+    node.start_matching([Stream("a"), Stream("b"), Stream("names", Need.LATCHED)])
     node.feed("a", 999, "a999")
     node.wait()
     assert node.taken == [("a999", "b999")]
 
 
 def test_a_frame_goes_without_what_is_optional_once_every_stream_has_been_quiet_for_a_while(node: Pairs) -> None:
-    node.begin([Stream("a"), Stream("b"), Stream("odom", Need.OPTIONAL)])
+    node.start_matching([Stream("a"), Stream("b"), Stream("odom", Need.OPTIONAL)])
     node.feed("odom", 4, "odom")
     for k, name in enumerate("ab"):
         node.feed(name, 5, f"{name}5")
@@ -112,7 +112,7 @@ def test_a_frame_goes_without_what_is_optional_once_every_stream_has_been_quiet_
 
 
 def test_a_frame_whose_partner_never_came_is_dropped_as_unmatched(node: Pairs) -> None:
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     node.feed("a", 5, "a5")
     node.feed("b", 6, "b6")
     counters = node.accounting.balance()
@@ -120,7 +120,7 @@ def test_a_frame_whose_partner_never_came_is_dropped_as_unmatched(node: Pairs) -
 
 
 def test_the_log_says_what_a_frame_without_a_partner_lacked(node: Pairs, said: list[str]) -> None:
-    node.begin([Stream("a"), Stream("b", slop_ns=20_000_000), Stream("names", Need.LATCHED)])
+    node.start_matching([Stream("a"), Stream("b", slop_ns=20_000_000), Stream("names", Need.LATCHED)])
     node.feed("b", 0, "b")
     node.feed("names", 0, "cup")
     node.feed("a", 30_000_000, "a")
@@ -131,7 +131,7 @@ def test_the_log_says_what_a_frame_without_a_partner_lacked(node: Pairs, said: l
 
 
 def test_the_log_names_all_that_a_frame_waited_for_until_the_queue_was_full(node: Pairs, said: list[str]) -> None:
-    node.begin([Stream("a", depth=1), Stream("b"), Stream("names", Need.LATCHED)])
+    node.start_matching([Stream("a", depth=1), Stream("b"), Stream("names", Need.LATCHED)])
     node.feed("a", 5, "a5")
     node.feed("a", 6 + PATIENCE_NS, "a6")
     assert len(said) == 1
@@ -139,7 +139,7 @@ def test_the_log_names_all_that_a_frame_waited_for_until_the_queue_was_full(node
 
 
 def test_the_log_says_that_time_went_back(node: Pairs, said: list[str]) -> None:
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     node.feed("a", 5 + JUMP_NS, "a5")
     node.feed("a", 3, "a3")
     node.feed("a", 4, "a4")
@@ -147,14 +147,14 @@ def test_the_log_says_that_time_went_back(node: Pairs, said: list[str]) -> None:
 
 
 def test_the_log_says_that_a_stamp_is_odd(node: Pairs, said: list[str]) -> None:
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     for stamp in (5 + JUMP_NS, 3, 6 + JUMP_NS):
         node.feed("a", stamp, "a")
     assert said == ["frame dropped, odd stamp: its stamp is far from those before and after it"]
 
 
 def test_the_log_says_that_a_frame_came_late(node: Pairs, said: list[str]) -> None:
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     node.feed("a", 5, "a5")
     node.feed("a", 3, "a3")
     assert said == ["frame dropped, late: one with a later stamp came before it"]
@@ -164,7 +164,7 @@ def test_the_log_says_that_a_frame_came_late(node: Pairs, said: list[str]) -> No
     ("error", "reason"), [(DroppedError("disabled", ""), "disabled"), (ValueError("a broken contract"), "refused")]
 )
 def test_what_the_work_refuses_is_dropped_with_its_reason(node: Pairs, error: Exception, reason: str) -> None:
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     node.feed("b", 5, error)
     node.feed("a", 5, "a5")
     node.wait()
@@ -172,7 +172,7 @@ def test_what_the_work_refuses_is_dropped_with_its_reason(node: Pairs, error: Ex
 
 
 def test_a_bug_in_the_work_drops_the_frame_by_its_name_and_the_node_goes_on(node: Pairs) -> None:
-    node.begin([Stream("a"), Stream("b")])
+    node.start_matching([Stream("a"), Stream("b")])
     node.feed("b", 5, TypeError("a bug"))
     node.feed("a", 5, "a5")
     node.wait()
@@ -180,10 +180,10 @@ def test_a_bug_in_the_work_drops_the_frame_by_its_name_and_the_node_goes_on(node
 
 
 def test_streams_may_be_matched_anew_and_keep_what_is_latched(node: Pairs) -> None:
-    node.begin([Stream("a"), Stream("b"), Stream("c", Need.LATCHED), Stream("d", Need.LATCHED)])
+    node.start_matching([Stream("a"), Stream("b"), Stream("c", Need.LATCHED), Stream("d", Need.LATCHED)])
     node.feed("c", 0, "c0")
     node.feed("a", 5, "a5")
-    node.begin([Stream("b"), Stream("c", Need.LATCHED)])
+    node.start_matching([Stream("b"), Stream("c", Need.LATCHED)])
     assert node.accounting.balance().dropped == {"unmatched": 1}
     node.feed("b", 6, "b6")
     node.worker.close()
@@ -192,7 +192,7 @@ def test_streams_may_be_matched_anew_and_keep_what_is_latched(node: Pairs) -> No
 
 
 def test_diagnostics_tell_what_the_other_streams_brought(node: Pairs) -> None:
-    node.begin([Stream("a"), Stream("b"), Stream("c", Need.LATCHED)])
+    node.start_matching([Stream("a"), Stream("b"), Stream("c", Need.LATCHED)])
     node.feed("c", 0, "c")
     node.feed("b", 5, "b5")
     node.feed("b", 6, "b6")

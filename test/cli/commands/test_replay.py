@@ -71,8 +71,8 @@ class Stage:
         self._take("lossless", patience, items, on_item)
         for item in self.plays[-1][2]:
             if item.kind == IMAGE:
-                self.acknowledgements.receive("detector published", item.header_ns)
-        self.acknowledgements.receive("segmenter dropped unmatched", 0)
+                self.acknowledgements.read_acknowledgement("detector published", item.header_ns)
+        self.acknowledgements.read_acknowledgement("segmenter dropped unmatched", 0)
 
     def _take(
         self, how: str, number: float | None, items: Iterable[PlayedMessage], on_item: Callable[[PlayedMessage], None]

@@ -34,7 +34,7 @@ def node(number: int, stamp: float, T: Array | None = None, map_id: int = 0, wei
 
 def told(*nodes: Any) -> RtabmapNodes:
     made = RtabmapNodes()
-    made.receive(SimpleNamespace(nodes=nodes))
+    made.add_map_data(SimpleNamespace(nodes=nodes))
     return made
 
 
@@ -92,8 +92,8 @@ def test_no_way_leads_past_the_newest_node_or_from_one_map_to_another(last_map: 
 
 def test_a_number_with_another_stamp_is_of_another_database() -> None:
     nodes = walk(1, 2, 61)
-    assert not nodes.receive(SimpleNamespace(nodes=[node(3, 61.0, body_at(61)), node(4, 62.0, body_at(62))]))
-    assert nodes.receive(SimpleNamespace(nodes=[node(1, 500.0, body_at(0))])) and len(nodes) == 1
+    assert not nodes.add_map_data(SimpleNamespace(nodes=[node(3, 61.0, body_at(61)), node(4, 62.0, body_at(62))]))
+    assert nodes.add_map_data(SimpleNamespace(nodes=[node(1, 500.0, body_at(0))])) and len(nodes) == 1
 
 
 def test_intermediate_nodes_landmarks_and_nodes_without_odometry_are_left_out() -> None:

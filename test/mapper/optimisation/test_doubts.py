@@ -19,7 +19,7 @@ BY_ODOMETRY, IN_PAIRS = MapperParams(trust="odometry"), MapperParams(pairwise_co
 def session() -> Session:
     made = Session()
     for one in odometry(square()):
-        made.add(one, MapperParams())
+        made.add_pose(one, MapperParams())
     return made
 
 

@@ -50,7 +50,7 @@ def test_two_measurements_meet_where_their_information_says() -> None:
     expected = there(least_squares(residuals, np.zeros(6), xtol=1e-14).x)
     graph = IncrementalGraph.begun(np.eye(4))
     graph.grow(T_first[None], edges)
-    graph.settle()
+    graph.solve_poses()
     np.testing.assert_allclose(graph.poses()[1], expected, atol=1e-4)
 
 
@@ -58,28 +58,28 @@ def test_the_first_node_stays() -> None:
     start = translation(3.0, 4.0)
     graph = IncrementalGraph.begun(start)
     graph.grow(np.eye(4)[None], edge(0, 1, translation(1.0)))
-    graph.settle()
+    graph.solve_poses()
     np.testing.assert_allclose(graph.poses(), [start, translation(4.0, 4.0)], atol=1e-6)
 
 
 def test_what_is_taken_out_leaves_no_trace() -> None:
     graph = row()
     before = graph.poses()
-    numbers = graph.add(edge(0, 5, translation(5.0, 1.0), sigma=1e-3))
-    graph.settle()
+    numbers = graph.add_edges(edge(0, 5, translation(5.0, 1.0), sigma=1e-3))
+    graph.solve_poses()
     assert graph.poses()[5][1, 3] == pytest.approx(1.0, abs=0.01)
     graph.remove(numbers)
-    graph.settle()
+    graph.solve_poses()
     np.testing.assert_allclose(graph.poses(), before, atol=1e-3)
 
 
 def test_numbers_tell_edges_apart_whether_they_were_solved_or_still_wait() -> None:
     graph = row()
-    right = graph.add(edge(0, 5, translation(5.0, 0.2), sigma=1e-3))
-    graph.settle()
-    wrong = graph.add(edge(0, 4, translation(4.0, 3.0), sigma=1e-3))
+    right = graph.add_edges(edge(0, 5, translation(5.0, 0.2), sigma=1e-3))
+    graph.solve_poses()
+    wrong = graph.add_edges(edge(0, 4, translation(4.0, 3.0), sigma=1e-3))
     graph.remove(wrong)  # before it was ever solved
-    graph.settle()
+    graph.solve_poses()
     assert {*right}.isdisjoint(wrong)
     assert graph.poses()[5][1, 3] == pytest.approx(0.2, abs=0.01)
 
@@ -89,7 +89,7 @@ def test_a_step_gives_way_to_two_with_a_node_between() -> None:
     whole = graph.grow(translation(2.0)[None], edge(0, 1, translation(2.0)))
     halves = edge(0, 2, translation(1.0)).joined(edge(2, 1, translation(1.0)))
     graph.grow(translation(1.0)[None], halves, whole)
-    graph.settle()
+    graph.solve_poses()
     np.testing.assert_allclose(graph.poses()[:, 0, 3], [0.0, 2.0, 1.0], atol=1e-6)
     covariance = np.eye(6) + graph.error_covariance(edge(0, 1, translation(2.0)))
     assert covariance[3, 3] == pytest.approx(1.0 + 2.0, rel=0.01)  # its own, and those of both halves
@@ -99,8 +99,8 @@ def test_what_is_tried_on_a_copy_does_not_touch_the_graph() -> None:
     graph = row()
     before = graph.poses()
     other = graph.copied()
-    other.add(edge(0, 5, translation(5.0, 1.0), sigma=1e-3))
-    other.settle()
+    other.add_edges(edge(0, 5, translation(5.0, 1.0), sigma=1e-3))
+    other.solve_poses()
     np.testing.assert_array_equal(graph.poses(), before)
     assert other.poses()[5][1, 3] == pytest.approx(1.0, abs=0.01)
     graph.grow(translation(6.0)[None], edge(5, 6, translation(1.0)))
@@ -114,17 +114,17 @@ def test_what_an_edge_is_expected_to_cost_is_what_it_costs(sideways: float) -> N
     new = edge(1, 5, translation(4.0, sideways), sigma=0.05)
     error = whitened_errors(graph.poses(), new)[0]
     expected = error @ np.linalg.solve(np.eye(6) + graph.error_covariance(new), error)
-    graph.add(new)
-    graph.settle()
+    graph.add_edges(new)
+    graph.solve_poses()
     assert squared_residuals(graph.poses(), steps.joined(new)).sum() == pytest.approx(expected, rel=0.02)
 
 
 def test_a_graph_without_an_answer_says_so() -> None:
     graph, spoilt = row(), edge(0, 5, translation(5.0))
     spoilt.T_1_2[0, 0, 3] = np.nan
-    graph.add(spoilt)
+    graph.add_edges(spoilt)
     with pytest.raises(RuntimeError):
-        graph.settle()
+        graph.solve_poses()
 
 
 def test_where_gtsam_is_not_installed_the_error_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:

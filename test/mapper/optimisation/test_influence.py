@@ -32,8 +32,8 @@ def solved(closures: list[Edges]) -> tuple[IncrementalGraph, Array]:
     graph = IncrementalGraph.begun(np.eye(4))
     places = np.array([pose(np.eye(3), np.array([float(k), 0.0, 0.0])) for k in range(1, COUNT)])
     graph.grow(places, joined([edge(k, k + 1, sigma=0.1) for k in range(COUNT - 1)]))
-    graph.add(joined(closures))
-    return graph, graph.settle()
+    graph.add_edges(joined(closures))
+    return graph, graph.solve_poses()
 
 
 @pytest.mark.parametrize("gone", [[], [1], [2, 3], [1, 2, 3]])

@@ -23,7 +23,7 @@ ASIDE = pose(np.eye(3), np.array([0.0, 2.0, 0.0]))
 def session() -> Session:
     made = Session()
     for one in odometry(square()):
-        made.add(one, MapperParams())
+        made.add_pose(one, MapperParams())
     return made
 
 

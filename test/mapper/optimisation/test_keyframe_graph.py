@@ -26,7 +26,7 @@ TRUE = square(laps=2)
 def session() -> Session:
     made = Session()
     for one in odometry(TRUE):
-        made.add(one, PLAIN)
+        made.add_pose(one, PLAIN)
     return made
 
 

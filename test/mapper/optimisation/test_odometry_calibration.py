@@ -28,7 +28,7 @@ CLOSURES = [(k, k + 12) for k in range(0, 40, 4)]
 def session(poses: list[Array]) -> Session:
     made = Session()
     for one in odometry(poses):
-        made.add(one, MapperParams())
+        made.add_pose(one, MapperParams())
     return made
 
 

@@ -193,7 +193,7 @@ def test_what_was_withdrawn_is_believed_again_once_it_is_admitted() -> None:
 
 
 def test_a_closure_with_which_there_is_no_solution_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    settle, add = IncrementalGraph.settle, IncrementalGraph.add
+    settle, add = IncrementalGraph.solve_poses, IncrementalGraph.add_edges
 
     def poisoned(graph: IncrementalGraph, edges: Edges) -> list[int]:
         graph.poison = bool((edges.k1 == 4).any())  # type: ignore[attr-defined]
@@ -204,8 +204,8 @@ def test_a_closure_with_which_there_is_no_solution_is_left_out(monkeypatch: pyte
             raise RuntimeError("no solution")
         return settle(graph)
 
-    monkeypatch.setattr(IncrementalGraph, "add", poisoned)
-    monkeypatch.setattr(IncrementalGraph, "settle", failing)
+    monkeypatch.setattr(IncrementalGraph, "add_edges", poisoned)
+    monkeypatch.setattr(IncrementalGraph, "solve_poses", failing)
     graph = closed([right(0, 9), lie(4, 11, 1.5), right(1, 10)])
     assert graph.kept.tolist() == [True, False, True]
     assert np.isfinite(graph.cost) and np.isfinite(graph.poses).all()

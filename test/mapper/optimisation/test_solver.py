@@ -35,7 +35,7 @@ PLAIN = MapperParams(steady_heading=0.0, steady_distance=0.0)
 def session(poses: Sequence[Array], params: MapperParams = PLAIN) -> Session:
     made = Session()
     for word in odometry(list(poses)):
-        made.add(word, params)
+        made.add_pose(word, params)
     return made
 
 
@@ -223,7 +223,7 @@ def raised_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(IncrementalGraph, name, failing)
 
 
-@pytest.mark.parametrize("name", ["add", "error_covariance"])
+@pytest.mark.parametrize("name", ["add_edges", "error_covariance"])
 def test_a_closure_on_which_gtsam_raises_is_left_out(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     raised_for(name, monkeypatch)
     clean, solver = solved([ONE], RIGHT), Solver()

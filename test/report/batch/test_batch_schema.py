@@ -58,7 +58,7 @@ def edited(path: tuple[Any, ...], value: Any) -> Any:
 def write(summary: Any, folder: Path) -> None:
     row = Row.of(Path("bag"), "bag.json", summary)
     with batch_tables(folder) as tables:
-        tables.add(row, summary)
+        tables.add_recording(row, summary)
     batch_page([row], {})
 
 

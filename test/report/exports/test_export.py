@@ -26,7 +26,7 @@ def test_points_far_from_the_origin_of_the_odometry_keep_their_places(tmp_path: 
     T_utm_camera[1, 3] = 5_400_000.0
     taken = keyframe(1, 2.0, (item,), T_odom_camera=T_utm_camera)
     store = Store(tmp_path / "place.db")
-    store.add(taken, sightings_of(taken), [])
+    store.write_keyframe(taken, sightings_of(taken), [])
     store.close()
     *files, told = export(tmp_path / "place.db", tmp_path / "out")
     kept = Store(tmp_path / "place.db", read_only=True).keyframe(1)
@@ -44,7 +44,7 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
     taken = replace(taken, objects=(replace(taken.objects[0], sightings=3),))
     (sighting,) = sightings_of(taken)
     closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=np.eye(6), labels=("cup",))
-    store.add(taken, [sighting.of_landmark(7, np.eye(3))], [closure])
+    store.write_keyframe(taken, [sighting.of_landmark(7, np.eye(3))], [closure])
     store.close()
     files = list(export(tmp_path / "place.db", tmp_path / "out"))
     assert [str(f.relative_to(tmp_path / "out")) for f in files] == [
@@ -69,7 +69,7 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
 def test_two_objects_of_a_keyframe_are_two_files_even_where_they_are_one_landmark(tmp_path: Path) -> None:
     store = Store(tmp_path / "place.db")
     taken = keyframe(1, 2.0, (box("cup", (0, 0, 1)), box("cup", (0.4, 0, 1), instance=2)))
-    store.add(taken, [sighting.of_landmark(7, np.eye(3)) for sighting in sightings_of(taken)])
+    store.write_keyframe(taken, [sighting.of_landmark(7, np.eye(3)) for sighting in sightings_of(taken)])
     store.close()
     first, second, *_ = export(tmp_path / "place.db", tmp_path / "out")
     middles = [float(read_ply(file)["x"].mean()) for file in (first, second)]
@@ -81,7 +81,7 @@ def _store_of(path: Path, *labels: str) -> Path:
     store = Store(path)
     for number, label in enumerate(labels, start=1):
         taken = keyframe(number, 2.0 * number, (box(label, (0, 0, 1)),))
-        store.add(taken, [s.of_landmark(number, np.eye(3)) for s in sightings_of(taken)])
+        store.write_keyframe(taken, [s.of_landmark(number, np.eye(3)) for s in sightings_of(taken)])
     store.close()
     return path
 

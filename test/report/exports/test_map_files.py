@@ -43,7 +43,7 @@ def straight(seconds: int) -> RunSummary:
 def store_of(path: Path, *keyframes: Keyframe) -> Path:
     store = Store(path)
     for taken in keyframes:
-        store.add(taken, sightings_of(taken), [])
+        store.write_keyframe(taken, sightings_of(taken), [])
     store.close()
     return path
 

@@ -46,7 +46,9 @@ def test_a_description_tells_the_noise_of_the_depth_of_stored_views(tmp_path: Pa
         taken = keyframe(number, 10.0 * number, (box("cup", (0, 0, 1)),), 0, moved(0.0))
         xyz = back_project(z.astype(np.float32), 130.0, 130.0, 80.0, 60.0)
         camera = Intrinsics(fx=130.0, fy=130.0, cx=80.0, cy=60.0, width=160, height=120)
-        store.add(replace(taken, view=View(xyz=xyz, grey=None, intrinsics=camera)), sightings_of(taken), (), {})
+        store.write_keyframe(
+            replace(taken, view=View(xyz=xyz, grey=None, intrinsics=camera)), sightings_of(taken), (), {}
+        )
     store.close()
     found = survey(tmp_path / "noisy.db")
     assert found.depth_noise == pytest.approx(2.0 / KINECT, rel=0.1)

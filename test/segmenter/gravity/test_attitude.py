@@ -37,7 +37,7 @@ def off_deg(filter_: AttitudeFilter, truth: np.ndarray) -> float:
 
 
 def run(filter_: AttitudeFilter, first: int, count: int, make: Callable[[int], ImuSample]) -> list[FeltGravity]:
-    return [word for k in range(first, first + count) if (word := filter_.receive(make(k))) is not None]
+    return [word for k in range(first, first + count) if (word := filter_.add_imu(make(k))) is not None]
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, -75.0, 180.0])
@@ -55,7 +55,7 @@ def test_an_imu_at_rest_tells_its_tilt_and_becomes_surer(
 
 def test_a_direction_that_was_wrong_at_the_start_turns_right_while_the_gyroscope_carries_it() -> None:
     filter_ = AttitudeFilter()
-    filter_.receive(sample(0, -G * DOWN + np.array([5.0, 0.0, 0.0]), SMALL_TURN))  # pushed from the side
+    filter_.add_imu(sample(0, -G * DOWN + np.array([5.0, 0.0, 0.0]), SMALL_TURN))  # pushed from the side
     assert off_deg(filter_, DOWN) > 25.0 and filter_.sigma_deg > 20.0
     rate = np.radians(40.0)  # about x, for two seconds
     run(filter_, 1, 2 * HZ, lambda k: sample(k, -G * tilted(-np.degrees(rate) * k / HZ), (rate, 0.0, 0.0)))
@@ -96,7 +96,7 @@ def test_in_a_hand_the_error_is_what_the_deviation_says() -> None:
             push = push * (1.0 - 3.3 / HZ) + rng.normal(0.0, 0.6 * np.sqrt(6.6 / HZ), 3)
             R = R @ rotation_from_vector(turn / HZ)
             felt = R.T @ (np.array([0.0, 0.0, G]) + push) + rng.normal(0.0, 0.05, 3)
-            filter_.receive(sample(k, felt, turn + bias + rng.normal(0.0, 0.005, 3)))
+            filter_.add_imu(sample(k, felt, turn + bias + rng.normal(0.0, 0.005, 3)))
             errors.append(off_deg(filter_, -R[2]))
             squares.append(errors[-1] ** 2 / filter_.sigma_deg**2 / 2.0)
     assert 0.1 < np.mean(squares) < 1.5 and np.percentile(errors, 95) < 6.0
@@ -107,7 +107,7 @@ def test_how_often_an_imu_speaks_makes_it_no_surer() -> None:
     for every in (1, 4):
         filter_ = AttitudeFilter()
         for k in range(0, 3 * HZ, every):
-            filter_.receive(sample(k, -G * DOWN, SMALL_TURN))
+            filter_.add_imu(sample(k, -G * DOWN, SMALL_TURN))
         sure.append(filter_.sigma_deg)
     assert sure[0] == pytest.approx(sure[1], rel=0.02)
 
@@ -172,11 +172,11 @@ def test_a_gyroscope_that_tells_the_impossible_is_not_believed() -> None:
 def test_stamps_that_come_late_are_passed_over_and_a_clock_that_jumps_begins_anew() -> None:
     filter_ = AttitudeFilter()
     run(filter_, 0, HZ, lambda k: sample(k, -G * DOWN, SMALL_TURN))
-    assert filter_.receive(sample(HZ - 3, G * DOWN, SMALL_TURN)) is None and off_deg(filter_, DOWN) < 1e-3
-    assert filter_.receive(sample(HZ - 1, G * DOWN, SMALL_TURN)) is None
-    word = filter_.receive(sample(-10 * HZ, -G * tilted(20.0), SMALL_TURN))
+    assert filter_.add_imu(sample(HZ - 3, G * DOWN, SMALL_TURN)) is None and off_deg(filter_, DOWN) < 1e-3
+    assert filter_.add_imu(sample(HZ - 1, G * DOWN, SMALL_TURN)) is None
+    word = filter_.add_imu(sample(-10 * HZ, -G * tilted(20.0), SMALL_TURN))
     assert word is not None and word.gravity == pytest.approx(tilted(20.0)) and word.gravity_sigma_deg > 3.0
-    word = filter_.receive(sample(3600 * HZ, -G * tilted(40.0), SMALL_TURN))
+    word = filter_.add_imu(sample(3600 * HZ, -G * tilted(40.0), SMALL_TURN))
     assert word is not None and word.gravity == pytest.approx(tilted(40.0))
     assert filter_.counts == {"late": 2, "time_jump": 1, "gap": 1}
 
@@ -184,7 +184,7 @@ def test_stamps_that_come_late_are_passed_over_and_a_clock_that_jumps_begins_ane
 def test_another_imu_on_the_topic_begins_anew() -> None:
     filter_ = AttitudeFilter()
     run(filter_, 0, HZ, lambda k: sample(k, -G * DOWN, SMALL_TURN, frame_id="a"))
-    word = filter_.receive(sample(HZ, -G * tilted(90.0), SMALL_TURN, frame_id="b"))
+    word = filter_.add_imu(sample(HZ, -G * tilted(90.0), SMALL_TURN, frame_id="b"))
     assert word is not None and word.gravity == pytest.approx(tilted(90.0)) and word.frame_id == "b"
 
 
@@ -203,6 +203,6 @@ def test_any_sequence_of_finite_samples_keeps_a_direction_of_length_1() -> None:
         scale = 10.0 ** rng.uniform(-12, 12)
         turn = rng.normal(0, 1, 3) * 10.0 ** rng.uniform(-12, 3) if rng.random() < 0.9 else None
         acceleration = rng.normal(0, 1, 3) * (scale if rng.random() < 0.5 else 7.0)
-        word = filter_.receive(sample(0, acceleration, turn, stamp_ns=int(rng.integers(0, 4 * 10**9))))
+        word = filter_.add_imu(sample(0, acceleration, turn, stamp_ns=int(rng.integers(0, 4 * 10**9))))
         if word is not None:
             assert np.linalg.norm(word.gravity) == pytest.approx(1.0) and 0.0 < word.gravity_sigma_deg <= 90.0

@@ -177,7 +177,7 @@ def test_another_camera_begins_anew() -> None:
 def test_what_is_forgotten_is_not_told() -> None:
     estimate = estimate_of(stream(25.0))
     assert estimate.noise is not None and estimate.lag is not None and estimate.depth_to_colour.text()
-    estimate.forget()
+    estimate.forget_stream()
     assert estimate.noise is None and estimate.lag is None and estimate.depth_to_colour.frames == 0
 
 

@@ -33,7 +33,7 @@ NOW_S = 2 / RATE
 
 
 def taken(scene: Scene, seed: int = 0, of: int = 0, **rig: object) -> Rendering:
-    return Rig(RigParams.from_mapping(rig), KINECT, of).take(scene, PAN, NOW_S, seed, PERFECT, QUIET)
+    return Rig(RigParams.from_mapping(rig), KINECT, of).take_picture(scene, PAN, NOW_S, seed, PERFECT, QUIET)
 
 
 def plainly(scene: Scene, T: np.ndarray) -> Rendering:
@@ -95,7 +95,7 @@ def test_motion_blurs_an_edge_over_the_way_that_it_makes_in_the_exposure() -> No
 def test_a_camera_at_rest_blurs_and_rolls_nothing() -> None:
     still = Motion(np.stack([AHEAD] * 3), RATE)
     rig = Rig(RigParams(rolling_ms=20.0, blur_ms=20.0), KINECT, 0)
-    image = rig.take(box_before_wall(printed()), still, 1 / RATE, 0, PERFECT, QUIET)
+    image = rig.take_picture(box_before_wall(printed()), still, 1 / RATE, 0, PERFECT, QUIET)
     assert (image.rgb == plainly(box_before_wall(printed()), still.at(1 / RATE)).rgb).all()
 
 
@@ -116,7 +116,7 @@ def test_the_depth_camera_is_turned_and_moved_as_stated() -> None:
     rig = Rig(RigParams(misregistration_deg=0.5, misregistration_mm=8.0), KINECT, 3)
     degrees, cm = pose_error(rig.T_colour_depth, np.eye(4))
     assert degrees == pytest.approx(0.5) and cm == pytest.approx(0.8)
-    image = rig.take(box_before_wall(printed()), PAN, NOW_S, 0, PERFECT, QUIET)
+    image = rig.take_picture(box_before_wall(printed()), PAN, NOW_S, 0, PERFECT, QUIET)
     assert (image.depth == plainly(box_before_wall(printed()), PAN.at(NOW_S) @ rig.T_colour_depth).depth).all()
 
 
