@@ -206,7 +206,7 @@ def require_honest_served(exchange: Any, honest: Side, what: bytes, hostile: Ite
         raise WrongAnswerError("an honest summary is not asked for")
     for packed in honest.deliveries:
         try:
-            if not exchange.awaits(packed) or exchange.take(packed) is None:
+            if not exchange.awaits(packed) or exchange.receive_delivery(packed) is None:
                 raise WrongAnswerError("an honest keyframe that was asked for is not taken")
         except ValueError as error:
             raise WrongAnswerError(f"an honest keyframe is refused: {error}") from error
@@ -220,7 +220,7 @@ def _ask(exchange: Any, honest: Side) -> Iterable[bytes | None]:
     """The requests for an honest peer's keyframes."""
     for summary in honest.summaries:
         exchange.sender(summary)
-        yield exchange.receive(summary, 0.5)
+        yield exchange.receive_summary(summary, 0.5)
 
 
 def _receive(exchange: Any, what: bytes, packed: bytes) -> None:
@@ -228,11 +228,11 @@ def _receive(exchange: Any, what: bytes, packed: bytes) -> None:
     try:
         if what == SUMMARY:
             exchange.sender(packed)
-            exchange.receive(packed, 0.5)
+            exchange.receive_summary(packed, 0.5)
         elif what == REQUEST:
             exchange.note(packed, 0.5)
         elif exchange.awaits(packed):
-            exchange.take(packed)
+            exchange.receive_delivery(packed)
     except ValueError:
         return
 

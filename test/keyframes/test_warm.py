@@ -19,7 +19,7 @@ def compiled():
 warm.warm(KeyframeParams())
 before = compiled()
 made = keyframer.Keyframer(KeyframeParams())
-windows = [made.add(warm.drawn(k * 500_000_000)) for k in range(4)] + [made.finish()]
+windows = [made.add_frame(warm.drawn(k * 500_000_000)) for k in range(4)] + [made.finish_window()]
 for window in windows:
     if window is not None:
         fusion.fuse(window, KeyframeParams())

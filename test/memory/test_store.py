@@ -40,7 +40,7 @@ store = Store(sys.argv[1])
 while True:
     number = store.next_keyframe()
     written = keyframe(number, float(number))
-    store.add(written, sightings_of(written))
+    store.write_keyframe(written, sightings_of(written))
     print(number, flush=True)
 """
 

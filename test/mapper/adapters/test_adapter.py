@@ -138,6 +138,6 @@ def test_what_is_on_its_way_is_not_pushed_out_and_is_withdrawn_too_late(
     node._keys["its id"] = asked
     node._retract("its id")
     assert by_key(*node.own_diagnostics())["retracted too late"] == 0
-    node.settle(asked)
+    node.note_delivered(asked)
     assert by_key(*node.own_diagnostics())["retracted too late"] == 1
     assert node.accounting.balance().dropped == {"queue_full": 1, "retracted": 1}
