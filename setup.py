@@ -2,10 +2,12 @@
 """One description for both ways: an ament_python package for colcon, and a pip package."""
 
 import os
+import platform
+import runpy
 from glob import glob
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
 
 NAME = "objreg_ros"
 PACKAGES = ("objreg_ros", "objreg_mapper", "objreg_tools")
@@ -18,6 +20,34 @@ def files_below(folder: str) -> list[tuple[str, list[str]]]:
         (os.path.join("share", NAME, root), [os.path.join(root, name) for name in sorted(names)])
         for root, _, names in os.walk(folder)
         if names
+    ]
+
+
+def kernels() -> list[Extension]:
+    """The builds of the kernels, as `objreg_ros.native` has them, on Python's stable interface."""
+    root = Path(__file__).resolve().parent
+    sources = runpy.run_path(str(root / NAME / "native" / "sources.py"))
+    files = [str(path.relative_to(root)) for path in sources["source_files"](root)]
+    # Sums in any order, as the processor's vectors take them; NaN and infinity stay what they are.
+    fast = "-fno-math-errno -fno-trapping-math -fno-signed-zeros -fassociative-math -freciprocal-math".split()
+    builds = {"plain": ["-O3", *fast]}
+    if platform.machine() == "x86_64":
+        builds["fast"] = ["-O3", *fast, "-march=x86-64-v3"]
+    if os.environ.get("OBJREG_CHECKED"):
+        builds["checked"] = ["-O1", "-DOBJREG_CHECKED"]
+    return [
+        Extension(
+            f"{NAME}.native.{build}",
+            [f"{NAME}/native/{build}.cpp"],
+            depends=files,
+            include_dirs=["."],
+            define_macros=[("SOURCES", sources["fingerprint"](root))],
+            extra_compile_args=["-std=c++17", "-fvisibility=hidden", "-ffp-contract=fast", "-g0", *flags],
+            extra_link_args=["-Wl,-s"],
+            language="c++",
+            py_limited_api=True,
+        )
+        for build, flags in builds.items()
     ]
 
 
@@ -51,7 +81,8 @@ setup(
     maintainer="objreg_ros maintainers",
     maintainer_email="maintainers@objreg-ros.invalid",
     packages=find_packages(include=[*PACKAGES, *(f"{package}.*" for package in PACKAGES)]),
-    package_data={package: ["py.typed", "report/templates/*"] for package in PACKAGES},
+    package_data={package: ["py.typed", "report/templates/*", "**/native/*.?pp"] for package in PACKAGES},
+    ext_modules=kernels(),
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml", "LICENSE"]),
@@ -107,5 +138,6 @@ setup(
             "objreg_to_g2o = objreg_mapper.adapters.g2o:main",
         ],
     },
+    options={"build_ext": {"parallel": 2}, "bdist_wheel": {"py_limited_api": "cp311"}},
     zip_safe=False,
 )

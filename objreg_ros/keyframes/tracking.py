@@ -11,17 +11,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import float64, njit
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import View
 from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.native import kernels
 from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.sensor import TRACKING_SIGMA_GROWTH, TRACKING_SIGMA_M
 
+_KERNELS = kernels("tracking")
 COARSE_TO_FINE = ((3, 0.20, 6), (2, 0.06, 10))  # stride in pixels, largest distance of a pair in metres, iterations
 GREY_SIGMA = 10.0  # grey levels: noise, vignetting and the residue of exposure
-HUBER = 1.3  # standard deviations beyond which an error counts linearly
 LEAST_SHARE = 0.5  # of the pixels that land in the other view; less is another scene or a lost track
 LEAST_PAIRS = 200
 SAME_PICTURE = 0.8  # correlation of grey: right poses have more (370 looked at), of slipped ones 19 of 20 have less
@@ -66,9 +66,9 @@ def view_motion(source: View, target: TrackedSurface, T_target_source: Array | N
         xyz, grey = _thin(source, stride)
         grey_weight = 1.0 / GREY_SIGMA if target.has_grey and source.grey is not None else 0.0
         for _ in range(iterations):
-            H, g, pairs, seen, brighter = _normal_equations(
+            H, g, pairs, seen, brighter = _KERNELS.normal_equations(
                 xyz, grey, T, target.xyz, target.normals, target.grey, target.slope, target.camera,
-                reach, grey_weight, exposure,
+                reach, grey_weight, exposure, (TRACKING_SIGMA_M, TRACKING_SIGMA_GROWTH),
             )  # fmt: skip
             if pairs < LEAST_PAIRS:
                 return None
@@ -90,7 +90,7 @@ def same_picture(source: View, target: TrackedSurface, T_target_source: Array) -
     if source.grey is None or not target.has_grey:
         return 1.0
     xyz, grey = _thin(source, 2)
-    correlation, contrast = _correlation(xyz, grey, T_target_source, target.xyz, target.grey, target.camera)
+    correlation, contrast = _KERNELS.correlation(xyz, grey, T_target_source, target.xyz, target.grey, target.camera)
     unexplained = contrast * np.sqrt(max(1.0 - correlation * correlation, 0.0))
     return 1.0 if unexplained <= GREY_SIGMA else float(correlation)
 
@@ -100,89 +100,3 @@ def _thin(view: View, stride: int) -> tuple[Array, Array]:
     known = np.isfinite(xyz[:, 2])
     grey = np.zeros(len(xyz), np.uint8) if view.grey is None else view.grey[::stride, ::stride].reshape(-1)
     return np.ascontiguousarray(xyz[known]), grey[known].astype(np.float32)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _huber(scaled: float) -> float:
-    size = abs(scaled)
-    return 1.0 if size < HUBER else HUBER / size
-
-
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _add(H, g, x, y, z, a, b, c, error, weight):  # type: ignore[no-untyped-def]
-    """Add an error with the gradient (a, b, c) at the point (x, y, z) that moves; the upper triangle of H only."""
-    J = (a, b, c, y * c - z * b, z * a - x * c, x * b - y * a)
-    for i in range(6):
-        weighted = weight * J[i]
-        g[i] += weighted * error
-        for j in range(i, 6):
-            H[i, j] += weighted * J[j]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _normal_equations(xyz, grey, T, target_xyz, normals, target_grey, slope, camera, reach, grey_weight, exposure):  # type: ignore[no-untyped-def]
-    """The upper triangle of ``J^T W J`` and ``J^T W e`` of a step that multiplies from the left.
-
-    With them the number of pairs, of pixels that could have been one, and how much brighter the target is.
-    """
-    H, g = np.zeros((6, 6)), np.zeros(6)
-    height, width = target_grey.shape
-    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
-    pairs, seen, brightness, weights = 0, 0, 0.0, 0.0
-    for k in range(len(xyz)):
-        x = T[0, 0] * xyz[k, 0] + T[0, 1] * xyz[k, 1] + T[0, 2] * xyz[k, 2] + T[0, 3]
-        y = T[1, 0] * xyz[k, 0] + T[1, 1] * xyz[k, 1] + T[1, 2] * xyz[k, 2] + T[1, 3]
-        z = T[2, 0] * xyz[k, 0] + T[2, 1] * xyz[k, 1] + T[2, 2] * xyz[k, 2] + T[2, 3]
-        u, v = fx * x / z + cx, fy * y / z + cy
-        if z < 0.1 or u < 0.0 or v < 0.0 or u > width - 1.0 or v > height - 1.0:
-            continue
-        i, j = int(v + 0.5), int(u + 0.5)
-        nx, ny, nz = float64(normals[i, j, 0]), float64(normals[i, j, 1]), float64(normals[i, j, 2])
-        if nx == 0.0 and ny == 0.0 and nz == 0.0:
-            continue
-        seen += 1
-        distance = (x - target_xyz[i, j, 0]) * nx + (y - target_xyz[i, j, 1]) * ny + (z - target_xyz[i, j, 2]) * nz
-        if abs(distance) > reach:
-            continue
-        pairs += 1
-        precision = 1.0 / (TRACKING_SIGMA_M + TRACKING_SIGMA_GROWTH * z * z)
-        _add(H, g, x, y, z, nx, ny, nz, distance, precision * precision * _huber(distance * precision))
-        if grey_weight > 0.0:
-            a, b = float64(slope[i, j, 0]), float64(slope[i, j, 1])
-            error = target_grey[i, j] + a * (u - j) + b * (v - i) - grey[k] - exposure
-            weight = grey_weight * grey_weight * _huber(error * grey_weight)
-            a, b = a * fx / z, b * fy / z
-            _add(H, g, x, y, z, a, b, -(a * x + b * y) / z, error, weight)
-            brightness += weight * error
-            weights += weight
-    return H, g, pairs, max(seen, 1), brightness / max(weights, 1e-12)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _correlation(xyz, grey, T, target_xyz, target_grey, camera):  # type: ignore[no-untyped-def]
-    """The correlation of grey over the pixels that land on known depth, and the deviation of what they land on.
-
-    0 and inf for fewer than `LEAST_PAIRS`.
-    """
-    height, width = target_grey.shape
-    n, a, b, aa, bb, ab = 0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(len(xyz)):
-        z = T[2, 0] * xyz[k, 0] + T[2, 1] * xyz[k, 1] + T[2, 2] * xyz[k, 2] + T[2, 3]
-        if z < 0.1:
-            continue
-        x = T[0, 0] * xyz[k, 0] + T[0, 1] * xyz[k, 1] + T[0, 2] * xyz[k, 2] + T[0, 3]
-        y = T[1, 0] * xyz[k, 0] + T[1, 1] * xyz[k, 1] + T[1, 2] * xyz[k, 2] + T[1, 3]
-        u, v = camera[0] * x / z + camera[2], camera[1] * y / z + camera[3]
-        if u < 0.0 or v < 0.0 or u > width - 1.0 or v > height - 1.0:
-            continue
-        i, j = int(v + 0.5), int(u + 0.5)
-        if not target_xyz[i, j, 2] > 0.0:
-            continue
-        here, there = float64(grey[k]), float64(target_grey[i, j])
-        n, a, b = n + 1, a + here, b + there
-        aa, bb, ab = aa + here * here, bb + there * there, ab + here * there
-    if n < LEAST_PAIRS:
-        return 0.0, np.inf
-    here, there = aa - a * a / n, bb - b * b / n
-    correlation = (ab - a * b / n) / np.sqrt(here * there) if here * there > 0.0 else 0.0
-    return correlation, np.sqrt(max(there / n, 0.0))

@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import View
 from objreg_ros.geometry import pose, rotation_angle, rotation_from_vector
+from objreg_ros.native import kernels
 
+_KERNELS = kernels("turn")
 WIDTHS = (20, 40)  # px of the pictures, coarse to fine
 BLUR = 1.2  # px, one sigma
 ITERATIONS = 8
@@ -72,7 +73,7 @@ def turn_between(
     R, difference = np.eye(3) if R_target_source is None else R_target_source.copy(), np.inf
     for one, other in zip(source, target, strict=True):
         for _ in range(ITERATIONS):
-            H, g, difference, overlap = _equations(one.grey, one.camera, R, other.grey, other.slope, other.camera)
+            H, g, difference, overlap = _KERNELS.equations(one.grey, one.camera, R, other.grey, other.slope, other.camera)
             if overlap < LEAST_OVERLAP:
                 return R, np.inf
             step = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(4) + 1e-9 * np.eye(4), g)
@@ -102,55 +103,3 @@ class LastPicture:
             return Turn()
         pixels = rotation_angle(R) * max(view.intrinsics.fx, view.intrinsics.fy)
         return Turn(pose(R, np.zeros(3)), pixels > FEW_PX)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _equations(grey, camera, R, target, slope, target_camera):  # type: ignore[no-untyped-def]
-    """The normal equations of a turn from the left and of the exposure; the difference, and the share that overlaps."""
-    H, g = np.zeros((4, 4)), np.zeros(4)
-    J = np.zeros(4)
-    J[3] = -1.0
-    rows, columns = grey.shape
-    height, width = target.shape
-    fx, fy, cx, cy = target_camera[0], target_camera[1], target_camera[2], target_camera[3]
-    count, total, squares = 0, 0.0, 0.0
-    for i in range(rows):
-        for j in range(columns):
-            a, b = (j - camera[2]) / camera[0], (i - camera[3]) / camera[1]
-            x = R[0, 0] * a + R[0, 1] * b + R[0, 2]
-            y = R[1, 0] * a + R[1, 1] * b + R[1, 2]
-            z = R[2, 0] * a + R[2, 1] * b + R[2, 2]
-            if z < 0.1:
-                continue
-            u, v = fx * x / z + cx, fy * y / z + cy
-            if u < 0.0 or v < 0.0 or u > width - 1.0 or v > height - 1.0:
-                continue
-            m, n = min(int(v), height - 2), min(int(u), width - 2)
-            p, q = v - m, u - n
-            w00, w01, w10, w11 = (1 - p) * (1 - q), (1 - p) * q, p * (1 - q), p * q
-            there = w00 * target[m, n] + w01 * target[m, n + 1] + w10 * target[m + 1, n] + w11 * target[m + 1, n + 1]
-            sx = (
-                w00 * slope[m, n, 0]
-                + w01 * slope[m, n + 1, 0]
-                + w10 * slope[m + 1, n, 0]
-                + w11 * slope[m + 1, n + 1, 0]
-            )
-            sy = (
-                w00 * slope[m, n, 1]
-                + w01 * slope[m, n + 1, 1]
-                + w10 * slope[m + 1, n, 1]
-                + w11 * slope[m + 1, n + 1, 1]
-            )
-            error = there - grey[i, j]
-            sx, sy = sx * fx / z, sy * fy / z
-            sz = -(sx * x + sy * y) / z
-            J[0], J[1], J[2] = y * sz - z * sy, z * sx - x * sz, x * sy - y * sx
-            count += 1
-            total += error
-            squares += error * error
-            for s in range(4):
-                g[s] += J[s] * error
-                for t in range(4):
-                    H[s, t] += J[s] * J[t]
-    mean = total / max(count, 1)
-    return H, g, np.sqrt(max(squares / max(count, 1) - mean * mean, 0.0)), count / (rows * columns)

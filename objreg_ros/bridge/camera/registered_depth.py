@@ -11,16 +11,14 @@ from __future__ import annotations
 from functools import lru_cache
 
 import cv2
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.geometry import inverse
+from objreg_ros.native import kernels
 
-SAME_SURFACE = 0.03  # of depth, between two pixels side by side; a grazing wall has less
-NEAREST_M = 0.05  # before the other camera; nothing is measured nearer
-MOST_REACH = 8.0  # px from the middle of what one pixel covers: bounds the work for cameras that cannot be
+_KERNELS = kernels("registered_depth")
 HARDLY_FINER = 1.25  # times the resolution of depth: such a picture is left as it is
 SHOWN_AT_M = (0.5, 5.0)  # a place is in the depth camera's picture where it is so at both distances
 
@@ -91,59 +89,11 @@ def moved(depth: Array, of: Intrinsics, T_to_of: Array, to: Intrinsics) -> Array
     K = np.array([to.fx, to.fy, to.cx, to.cy], np.float32)
     steps = (R[:, :2] / [of.fx, of.fy]).astype(np.float32)
     depth, uvz = np.ascontiguousarray(depth), np.empty((*depth.shape, 3), np.float32)
-    _project(depth, across, down, t, K, uvz)
+    _KERNELS.project(depth, across, down, t, K, uvz)
     found = np.full((to.height, to.width), np.inf, np.float32)
-    _splat(depth, uvz, steps, K, found)
+    _KERNELS.splat(depth, uvz, steps, K, found)
     found[np.isinf(found)] = 0.0
     return found
-
-
-@numba.njit(cache=True, nogil=True)
-def _project(depth, across, down, t, K, uvz):  # type: ignore[no-untyped-def]
-    """Where each pixel is in the other picture, and its depth there; 0 where there is none."""
-    fx, fy, cx, cy = K
-    for row in range(depth.shape[0]):
-        for column in range(depth.shape[1]):
-            z = depth[row, column]
-            ahead = z * (across[2, column] + down[2, row]) + t[2]
-            if not (z > 0 and ahead > NEAREST_M):
-                uvz[row, column, 2] = 0
-                continue
-            uvz[row, column, 0] = fx * (z * (across[0, column] + down[0, row]) + t[0]) / ahead + cx
-            uvz[row, column, 1] = fy * (z * (across[1, column] + down[1, row]) + t[1]) / ahead + cy
-            uvz[row, column, 2] = ahead
-
-
-@numba.njit(cache=True, nogil=True)
-def _splat(depth, uvz, steps, K, found):  # type: ignore[no-untyped-def]
-    """Lay each pixel over what it covers, from its own square on to the squares of the pixels right and below."""
-    height, width = depth.shape
-    tall, wide = found.shape
-    fx, fy, cx, cy = K
-    for row in range(height):
-        for column in range(width):
-            u, v, ahead = uvz[row, column]
-            if not (ahead > 0 and -MOST_REACH < u < wide + MOST_REACH and -MOST_REACH < v < tall + MOST_REACH):
-                continue
-            near = np.float32(0.5) * depth[row, column] / ahead
-            x, y = (u - cx) / fx, (v - cy) / fy
-            half_u = fx * near * (abs(steps[0, 0] - x * steps[2, 0]) + abs(steps[0, 1] - x * steps[2, 1]))
-            half_v = fy * near * (abs(steps[1, 0] - y * steps[2, 0]) + abs(steps[1, 1] - y * steps[2, 1]))
-            left, right, top, bottom = u - half_u, u + half_u, v - half_v, v + half_v
-            for k in range(2):
-                r, c = row + k, column + 1 - k
-                if r == height or c == width or uvz[r, c, 2] == 0:
-                    continue
-                if abs(depth[r, c] - depth[row, column]) > SAME_SURFACE * depth[row, column]:
-                    continue
-                left, right = min(left, uvz[r, c, 0] + half_u), max(right, uvz[r, c, 0] - half_u)
-                top, bottom = min(top, uvz[r, c, 1] + half_v), max(bottom, uvz[r, c, 1] - half_v)
-            first, last = max(0.0, np.ceil(max(left, u - MOST_REACH))), min(wide, np.ceil(min(right, u + MOST_REACH)))
-            begin, end = max(0.0, np.ceil(max(top, v - MOST_REACH))), min(tall, np.ceil(min(bottom, v + MOST_REACH)))
-            for i in range(int(begin), int(end)):
-                for j in range(int(first), int(last)):
-                    if ahead < found[i, j]:
-                        found[i, j] = ahead
 
 
 def _shown(depth: DepthImage, T_colour_depth: Array, camera: Intrinsics) -> Array | None:

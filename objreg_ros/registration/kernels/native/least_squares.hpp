@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kernels of least_squares.py: normal equations, their sums, their solution, and the step of a pose that it is.
+#pragma once
+#include "objreg_ros/native/array.hpp"
+
+namespace objreg::least_squares {
+// Add to H (6, 6) and g (6,) those of errors (n,) with a weight and a Jacobian (6, n).
+inline void add_normal_equations(View<const double, 2> J, View<const double, 1> error, View<const double, 1> weight,
+                                 View<double, 2> H, View<double, 1> g) {
+  const i64 n = error.size();
+  Array<double, 1> weighed(n);
+  for (int k = 0; k < 6; k++) {
+    double pull = 0.0;
+    for (i64 i = 0; i < n; i++) {
+      weighed(i) = weight(i) * J(k, i);
+      pull += weighed(i) * error(i);
+    }
+    g(k) += pull;
+    for (int m = 0; m <= k; m++) {
+      double total = 0.0;
+      for (i64 i = 0; i < n; i++) total += weighed(i) * J(m, i);
+      H(k, m) += total;
+      if (m != k) H(m, k) += total;
+    }
+  }
+}
+
+// Turn `b` (n,) into the x of A x = b for a positive definite `A` (n, n), by Cholesky; A is spoilt.
+inline void solve(View<double, 2> A, View<double, 1> b) {
+  const i64 n = b.size();
+  for (i64 i = 0; i < n; i++)
+    for (i64 j = 0; j <= i; j++) {
+      double value = A(i, j);
+      for (i64 k = 0; k < j; k++) value -= A(i, k) * A(j, k);
+      A(i, j) = i == j ? std::sqrt(std::max(value, 1e-18)) : value / A(j, j);
+    }
+  for (i64 i = 0; i < n; i++) {
+    for (i64 k = 0; k < i; k++) b(i) -= A(i, k) * b(k);
+    b(i) /= A(i, i);
+  }
+  for (i64 i = n - 1; i >= 0; i--) {
+    for (i64 k = i + 1; k < n; k++) b(i) -= A(k, i) * b(k);
+    b(i) /= A(i, i);
+  }
+}
+
+// Move a pose `T` (4, 4) by a left `step` (6,) [t r], in place; returns the largest of its parts.
+inline double move(View<double, 2> T, View<const double, 1> step) {
+  const double x = step(3), y = step(4), z = step(5), angle = std::sqrt(x * x + y * y + z * z);
+  const double sine = angle > 1e-12 ? std::sin(angle) / angle : 1.0;
+  const double versed = angle > 1e-6 ? (1.0 - std::cos(angle)) / (angle * angle) : 0.5;
+  for (int column = 0; column < 4; column++) {
+    const double a = T(0, column), b = T(1, column), c = T(2, column), along = x * a + y * b + z * c;
+    const double squared = angle * angle;
+    T(0, column) += sine * (y * c - z * b) + versed * (x * along - squared * a);
+    T(1, column) += sine * (z * a - x * c) + versed * (y * along - squared * b);
+    T(2, column) += sine * (x * b - y * a) + versed * (z * along - squared * c);
+  }
+  double largest = 0.0;
+  for (int k = 0; k < 3; k++) T(k, 3) += step(k);
+  for (int k = 0; k < 6; k++) largest = std::max(largest, std::abs(step(k)));
+  return largest;
+}
+
+// Fill `back` (4, 4) with the inverse of a pose.
+inline void invert(View<const double, 2> T, View<double, 2> back) {
+  for (int i = 0; i < 3; i++) {
+    back(i, 3) = 0.0;
+    for (int j = 0; j < 3; j++) {
+      back(i, j) = T(j, i);
+      back(i, 3) -= T(j, i) * T(j, 3);
+    }
+  }
+  back(3, 0) = back(3, 1) = back(3, 2) = 0.0, back(3, 3) = 1.0;
+}
+}  // namespace objreg::least_squares

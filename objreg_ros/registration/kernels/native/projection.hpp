@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kernels of projection.py: where a camera sees points, and what its image holds there. Other kernels begin with
+// them.
+#pragma once
+#include "objreg_ros/native/array.hpp"
+
+namespace objreg::projection {
+constexpr double LEAST_DEPTH = 0.1;  // m: nearer points are taken for points behind the camera
+
+struct Places { Array<double, 1> x, y, z; };
+struct Pixel { u32 row, column; };
+
+// The x, y and z (N,) of `points (N, 3)` moved by `T (4, 4)`.
+template <class P> Places moved(View<P, 2> points, View<const double, 2> T) {
+  const double xx = T(0, 0), xy = T(0, 1), xz = T(0, 2), x0 = T(0, 3);
+  const double yx = T(1, 0), yy = T(1, 1), yz = T(1, 2), y0 = T(1, 3);
+  const double zx = T(2, 0), zy = T(2, 1), zz = T(2, 2), z0 = T(2, 3);
+  const i64 n = points.size();
+  Places out{Array<double, 1>(n), Array<double, 1>(n), Array<double, 1>(n)};
+  double *__restrict x = out.x.data, *__restrict y = out.y.data, *__restrict z = out.z.data;
+  for (i64 i = 0; i < n; i++) {
+    const double a = points(i, 0), b = points(i, 1), c = points(i, 2);
+    x[i] = xx * a + xy * b + xz * c + x0;
+    y[i] = yx * a + yy * b + yz * c + y0;
+    z[i] = zx * a + zy * b + zz * c + z0;
+  }
+  return out;
+}
+
+// The pixels u, v and the depths z (N,) of `points (N, 3)` moved by `T (4, 4)`; for `lands` to sort out.
+template <class P, class C> Places project(View<P, 2> points, View<const double, 2> T, View<C, 1> camera) {
+  const double fx = camera(0), fy = camera(1), cx = camera(2), cy = camera(3);
+  Places out = moved(points, T);
+  double *__restrict u = out.x.data, *__restrict v = out.y.data, *__restrict z = out.z.data;
+  for (i64 i = 0; i < points.size(); i++) {
+    const double inverse = 1.0 / std::max(z[i], LEAST_DEPTH);
+    u[i] = fx * u[i] * inverse + cx;
+    v[i] = fy * v[i] * inverse + cy;
+  }
+  return out;
+}
+
+template <class T> bool lands(double u, double v, double z, View<T, 2> image) {
+  return (z >= LEAST_DEPTH) & (u >= 0.0) & (v >= 0.0) & (u <= image.shape[1] - 1.001) & (v <= image.shape[0] - 1.001);
+}
+
+inline Pixel nearest(double u, double v) { return {static_cast<u32>(v + 0.5), static_cast<u32>(u + 0.5)}; }
+
+struct Slopes { double value, u, v; };
+
+// The bilinear value of an `image (h, w)` at a place between four pixels, and its slopes along u and v.
+template <class T> Slopes between(View<T, 2> image, double u, double v) {
+  const u32 left = static_cast<u32>(u), top = static_cast<u32>(v);
+  const double a = u - left, b = v - top;
+  const auto p = image(top, left), q = image(top, left + 1), r = image(top + 1, left), s = image(top + 1, left + 1);
+  const double value = (1.0 - b) * ((1.0 - a) * p + a * q) + b * ((1.0 - a) * r + a * s);
+  return {value, (1.0 - b) * (q - p) + b * (s - r), (1.0 - a) * (r - p) + a * (s - q)};
+}
+
+// Add a value, and its weight of 1, to the four pixels of an `image (h, w, 2)` about a place.
+inline void drop(View<double, 3> image, u32 row, u32 column, double weight, double value) {
+  image(row, column, 0) += weight * value;
+  image(row, column, 1) += weight;
+}
+inline void spread(View<double, 3> image, double u, double v, double value) {
+  const u32 left = static_cast<u32>(u), top = static_cast<u32>(v);
+  const double a = u - left, b = v - top;
+  drop(image, top, left, (1.0 - b) * (1.0 - a), value);
+  drop(image, top, left + 1, (1.0 - b) * a, value);
+  drop(image, top + 1, left, b * (1.0 - a), value);
+  drop(image, top + 1, left + 1, b * a, value);
+}
+
+// Which of the projected points (N,) an image sees: (n,) indices. It measured between `near` and `far (h, w)` there, 0
+// where it measured nothing, and a depth z agrees within tolerance + growth z^2.
+template <class T> Array<u32, 1> visible(View<const double, 1> us, View<const double, 1> vs, View<const double, 1> zs,
+                                         View<T, 2> near, View<T, 2> far, double tolerance, double growth) {
+  Array<u32, 1> found(us.size() + 1);
+  i64 n = 0;
+  for (i64 i = 0; i < us.size(); i++) {
+    const double u = us(i), v = vs(i), z = zs(i);
+    if (!lands(u, v, z, near)) continue;
+    const Pixel at = nearest(u, v);
+    const double low = near(at.row, at.column), high = far(at.row, at.column);
+    const double slop = tolerance + growth * z * z;
+    found(n) = static_cast<u32>(i);
+    n += (high > 0.0) & (z >= low - slop) & (z <= high + slop);
+  }
+  return std::move(found).first(n);
+}
+}  // namespace objreg::projection
