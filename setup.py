@@ -29,7 +29,7 @@ def kernels() -> list[Extension]:
     sources = runpy.run_path(str(root / NAME / "native" / "sources.py"))
     files = [str(path.relative_to(root)) for path in sources["source_files"](root)]
     # Sums in any order, as the processor's vectors take them; NaN and infinity stay what they are.
-    fast = "-fno-math-errno -fno-trapping-math -fno-signed-zeros -fassociative-math -freciprocal-math".split()
+    fast = ["-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math", "-freciprocal-math"]
     builds = {"plain": ["-O3", *fast]}
     if platform.machine() == "x86_64":
         builds["fast"] = ["-O3", *fast, "-march=x86-64-v3"]

@@ -33,7 +33,7 @@ FREE_BRIDGE = (
     *("bridge.camera.lenses", "bridge.camera.mount", "bridge.camera.pace", "bridge.camera.registered_depth"),
     *("bridge.camera.travel", "bridge.streams.clock_monitor", "bridge.streams.sync", "bridge.streams.matching"),
 )
-FOR_ALL = ("limits", "sensor", "whole_file", "terminal", "share", "extra", "diagnostics")
+FOR_ALL = ("limits", "sensor", "whole_file", "terminal", "share", "extra", "diagnostics", "native")
 CORE = (*FOR_ALL, "data", "lens", "geometry", "params")
 DRIVERS = tuple(f"objreg_tools.{name}" for name in ("offline", "rehearsal", "truth", "workers", "report"))
 
@@ -98,6 +98,8 @@ def step(module: str) -> int:
 
 def allowed(importer: str, imported: str) -> bool:
     """The table of the import law."""
+    if importer == "native":
+        return imported == "native.sources"
     if imported in FOR_ALL and importer not in ("", *CORE):
         return True
     if below(importer, "objreg_tools"):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every key of package.xml leads to something that Ubuntu 24.04 (noble) with Jazzy can install.
 
-Every key was looked up in rosdistro at 8468e88: `rosdep/python.yaml` for the system's packages and pip's, and
-`jazzy/distribution.yaml` for ROS's, where it must be released. A rosdep key seldom says in which Ubuntu its package is
+Every key was looked up in rosdistro at 8468e88: `rosdep/base.yaml` and `rosdep/python.yaml` for the system's packages
+and pip's, and `jazzy/distribution.yaml` for ROS's, where it must be released. A rosdep key seldom says in which Ubuntu its package is
 (`ubuntu: [python3-numba]`, which noble has not), so look at packages.ubuntu.com/noble too. The versions in the table
 are those that noble is known by, not read from its archive: the workflow for Ubuntu 24.04, which installs them, is the
 proof.
@@ -24,7 +24,9 @@ RELEASED_IN_JAZZY = {
 BUILDS_MESSAGES = {"ament_cmake", "rosidl_default_generators", "rosidl_default_runtime"}  # released in Jazzy too
 HERE = {"objreg_msgs"}  # in this repository: rosdep and colcon are told of its folder
 IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, or one of PyPI
+    "g++-static": "g++ 13.2.0",
     "python3-click": "python3-click 8.1.6",
+    "python3-dev": "python3-dev 3.12.3",
     "python3-hypothesis": "python3-hypothesis 6.98.15",
     "python3-jinja2": "python3-jinja2 3.1.2",
     "python3-matplotlib": "python3-matplotlib 3.6.3",

@@ -21,7 +21,7 @@ import pytest
 PACKAGES = ("objreg_ros", "objreg_mapper", "objreg_tools")
 SOURCES = ("setup.py", "setup.cfg", "README.md", "LICENSE", "package.xml")
 FOLDERS = ("resource", "config", "launch", "models", *PACKAGES)
-LEFT_OUT = ("__pycache__", "*.nbi", "*.nbc")
+LEFT_OUT = ("__pycache__", "*.nbi", "*.nbc", "*.so")
 RUN = """
 from pathlib import Path
 import objreg_ros
@@ -63,7 +63,7 @@ def files(repository: Path, *folders: str) -> Iterator[PurePath]:
     """The files of some folders, without what programs leave there."""
     for folder in folders:
         for path in sorted((repository / folder).rglob("*")):
-            if path.is_file() and path.suffix not in {".nbi", ".nbc", ".pyc"}:
+            if path.is_file() and path.suffix not in {".nbi", ".nbc", ".pyc", ".so"}:
                 yield path.relative_to(repository)
 
 
@@ -87,7 +87,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_of_its_share(repository: 
     share = f"{data}/data/share/objreg_ros"
     wanted = {str(path) for path in files(repository, *PACKAGES)} | {f"{package}/py.typed" for package in PACKAGES}
     wanted |= {f"{share}/{path}" for path in files(repository, "config", "launch", "models")}
-    wanted |= {f"{share}/package.xml", f"{share}/LICENSE"}
+    wanted |= {f"{share}/package.xml", f"{share}/LICENSE", "objreg_ros/native/plain.abi3.so"}
     assert wanted <= held, f"the wheel lacks {sorted(wanted - held)}"
     assert not [name for name in held if name.startswith(("test", "benchmarks", "training"))]
 

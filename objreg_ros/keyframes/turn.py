@@ -73,7 +73,8 @@ def turn_between(
     R, difference = np.eye(3) if R_target_source is None else R_target_source.copy(), np.inf
     for one, other in zip(source, target, strict=True):
         for _ in range(ITERATIONS):
-            H, g, difference, overlap = _KERNELS.equations(one.grey, one.camera, R, other.grey, other.slope, other.camera)
+            seen = (one.grey, one.camera, R, other.grey, other.slope, other.camera)
+            H, g, difference, overlap = _KERNELS.equations(*seen)
             if overlap < LEAST_OVERLAP:
                 return R, np.inf
             step = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(4) + 1e-9 * np.eye(4), g)

@@ -3,8 +3,8 @@
 
 The kernels of ``x.py`` are in ``native/x.hpp`` beside it, and `files.hpp` lists them all. `array.hpp` has the arrays as
 kernels see them, `binding.hpp` makes functions of Python of them. Three builds of the same: ``plain`` runs on any
-processor, ``fast`` on those with AVX2 and FMA (x86-64-v3); ``checked`` looks at every index, and is only built and taken
-where the environment has ``OBJREG_CHECKED=1``. `sources` marks a build with the sources that it is of.
+processor, ``fast`` on those with AVX2 and FMA (x86-64-v3); ``checked`` looks at every index, and is only built and
+taken where the environment has ``OBJREG_CHECKED=1``. `sources` marks a build with the sources that it is of.
 """
 
 from __future__ import annotations

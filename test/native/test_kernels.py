@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How Python calls the kernels: builds, arguments, results."""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import shutil
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from objreg_ros import native
+from objreg_ros.native import sources
+
+PIXELS = np.array([0x01 << 4], np.uint8)  # a packed picture of one pixel without depth
+PROJECT = native.kernels("registered_depth").project
+UNPACK = native.kernels("rvl").unpack
+
+
+def projected(depth: np.ndarray, across: np.ndarray | None = None) -> np.ndarray:
+    height, width = depth.shape
+    out = np.zeros((height, width, 3), np.float32)
+    rays = np.zeros((3, width), np.float32) if across is None else across
+    PROJECT(depth, rays, np.ones((3, height), np.float32), np.zeros(3, np.float32), np.ones(4, np.float32), out)
+    return out
+
+
+def test_an_array_with_gaps_is_read_as_it_is_seen() -> None:
+    depth = np.arange(1, 49, dtype=np.float32).reshape(6, 8)
+    np.testing.assert_array_equal(projected(depth[::2, ::2]), projected(depth[::2, ::2].copy()))
+    np.testing.assert_array_equal(projected(depth.T), projected(depth.T.copy()))
+    np.testing.assert_array_equal(projected(depth[::-1]), projected(depth[::-1].copy()))
+
+
+def test_an_empty_array_is_no_error() -> None:
+    assert projected(np.zeros((0, 8), np.float32)).shape == (0, 8, 3)
+
+
+@pytest.mark.parametrize(
+    ("depth", "got"),
+    [
+        (np.zeros((2, 2)), "2 of 'd8'"),
+        (np.zeros((2, 2), np.int32), "2 of 'i4'"),
+        (np.zeros(2, np.float32), "1 of 'f4'"),
+    ],
+)
+def test_another_type_or_number_of_axes_is_refused(depth: np.ndarray, got: str) -> None:
+    out = np.zeros((2, 2, 3), np.float32)
+    rays = np.zeros((3, 2), np.float32)
+    with pytest.raises(TypeError, match=rf"expected an array of 2 axes, 'f4', .* got {got}"):
+        PROJECT(depth, rays, rays, np.zeros(3, np.float32), np.ones(4, np.float32), out)
+
+
+def test_an_array_to_be_filled_is_written_in_place_or_refused() -> None:
+    words, pixels = np.zeros(4, np.uint32), np.ones(4, np.uint16)
+    with pytest.raises(TypeError, match="the last without gaps"):
+        UNPACK(words, pixels[::2])
+    pixels.flags.writeable = False
+    with pytest.raises(ValueError, match="read-only"):
+        UNPACK(words, pixels)
+
+
+def test_another_number_of_arguments_is_refused() -> None:
+    with pytest.raises(TypeError, match="expected 2 arguments, got 1"):
+        UNPACK(np.zeros(1, np.uint32))
+
+
+def test_what_a_kernel_makes_lives_as_long_as_it_is_used() -> None:
+    equations = native.kernels("turn").equations
+    grey = np.random.default_rng(0).random((12, 16)).astype(np.float32)
+    slope, camera = np.ones((12, 16, 2), np.float32), np.array([16.0, 16.0, 8.0, 6.0])
+    results = [equations(grey, camera, np.eye(3), grey, slope, camera)[0] for _ in range(100)]
+    gc.collect()
+    assert all(np.array_equal(result, results[0]) for result in results) and results[0].dtype == np.float64
+    assert results[0].flags.writeable
+
+
+def test_other_threads_run_while_a_kernel_does() -> None:
+    words, pixels = np.full(1 << 20, 0x77777777, np.uint32), np.zeros(1 << 23, np.uint16)
+    depth, ran = np.ones((2000, 2000), np.float32), threading.Event()
+    thread = threading.Thread(target=ran.set)
+    sys.setswitchinterval(60.0)
+    try:
+        thread.start()
+        projected(depth)
+        UNPACK(words, pixels)
+        assert ran.wait(10.0)
+    finally:
+        sys.setswitchinterval(0.005)
+        thread.join()
+
+
+def test_every_file_of_kernels_is_listed_with_what_it_has(repository: Path) -> None:
+    headers = [path for path in sources.source_files(repository) if "METHODS[]" in path.read_text()]
+    listed = (repository / "objreg_ros/native/files.hpp").read_text()
+    for header in headers:
+        assert f'{{"{header.stem}", {header.stem}::METHODS}}' in listed
+        found = [name for name in vars(native.kernels(header.stem)) if not name.startswith("__")]
+        assert found and all(f'("{name}"' in header.read_text() for name in found)
+    assert len(headers) == listed.count("::METHODS}")
+
+
+def test_the_builds_of_one_processor_agree() -> None:
+    plain = importlib.import_module("objreg_ros.native.plain")
+    rng = np.random.default_rng(1)
+    words, results = rng.integers(0, 1 << 32, 4000, dtype=np.uint32), []
+    for build in (plain.rvl, native.kernels("rvl")):
+        pixels = np.zeros(20000, np.uint16)
+        results.append((build.unpack(words, pixels), pixels))
+    assert results[0][0] == results[1][0]
+    np.testing.assert_array_equal(results[0][1], results[1][1])
+
+
+def test_kernels_of_other_sources_are_refused_with_the_command_that_builds_them(
+    repository: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(repository / "objreg_ros/native", tmp_path / "objreg_ros/native")
+    (tmp_path / "objreg_ros/__init__.py").touch()
+    read = "from objreg_ros.native import kernels; kernels('rvl')"
+
+    def complaint() -> str:
+        done = subprocess.run([sys.executable, "-c", read], cwd=tmp_path, env={}, capture_output=True, text=True)
+        return done.stderr.splitlines()[-1]
+
+    assert "expected kernels built of the sources" in complaint()
+    assert "run  python setup.py build_ext --inplace  in" in complaint()
+    for built in (tmp_path / "objreg_ros/native").glob("*.so"):
+        built.unlink()
+    assert "got none: run" in complaint() and "g++" in complaint()
+
+
+def test_a_build_is_marked_with_names_and_contents_of_its_sources(tmp_path: Path) -> None:
+    folder = tmp_path / "objreg_ros/native"
+    folder.mkdir(parents=True)
+    marks = [sources.fingerprint(tmp_path)]
+    for name, text in (("a.hpp", "1"), ("a.hpp", "2"), ("b.cpp", "2"), ("notes.txt", "3")):
+        (folder / name).write_text(text)
+        marks.append(sources.fingerprint(tmp_path))
+    assert len(set(marks[:4])) == 4 and marks[4] == marks[3]
