@@ -94,7 +94,6 @@ setup(
     # What the robot's nodes and the library need: objreg_ros, and objreg_mapper but for its solver.
     install_requires=[
         "setuptools",
-        "numba>=0.59",
         "numpy>=1.26",
         "onnxruntime>=1.17",
         "opencv-python-headless>=4.6",

@@ -29,8 +29,8 @@ from objreg_ros.data.frames import Frame, ObjectCloud, View
 from objreg_ros.data.frames import Odometry as OdometryWord
 from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics, PointCloud
 from objreg_ros.geometry import back_project
-from objreg_ros.registrar.warm import drawn
 from objreg_ros.segmenter.sensor.organise import organise
+from objreg_tools.simulation.drawn_place import drawn
 
 SMALL = Intrinsics(fx=35.0, fy=35.0, cx=19.5, cy=14.5, width=40, height=30)
 SECOND = 1_000_000_000

@@ -43,7 +43,6 @@ from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.doubts import range_doubt, registration_doubt
@@ -69,7 +68,6 @@ def detect_attempt(_: Path) -> Attempt:
 def segment_attempt(_: Path) -> Attempt:
     """Depth or a cloud, detections and labels through the segmenter."""
     segmenter = Segmenter(SegmenterParams())
-    segmenter.warm()
     word = depth_word(camera=CAMERA)
     info = to_msg.camera_info(CAMERA, SECOND, "camera")
     colour = to_msg.image(colour_word(camera=CAMERA))
@@ -109,7 +107,6 @@ def _segment(segmenter: Segmenter, detections: Detections, depth: DepthImage, na
 def register_attempt(_: Path) -> Attempt:
     """Frames through a registrar: the same place twice, one time or both spoilt."""
     params = RegistrarParams(threads=1, min_gap=1.0)
-    warm(params)
     goods = [(frame_messages(frame_word(k, step)), frame_messages(frame_word(k, step))) for k, step in ((0, 2), (0, 4))]
 
     def attempt(draw: random.Random) -> None:

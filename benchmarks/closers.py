@@ -22,7 +22,6 @@ from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 from objreg_tools.report.run.revisits import Revisit, SeenPlace, recall_by_view_change, revisits
 from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 from objreg_tools.truth import FALSE, LOOSE, Truth, within
@@ -49,7 +48,6 @@ class Result:
 def ours(source: Source, seed: int, **other: float) -> Result:
     """The registrar, frame by frame, with ``other`` values of its parameters."""
     params = RegistrarParams(seed=seed).replaced(**source.camera, **other)
-    warm(params)
     registrar = Registrar(params)
     result = Result([], 0, 0.0)
     start = time.process_time()

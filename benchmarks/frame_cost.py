@@ -21,7 +21,6 @@ from tables import table_story
 from objreg_ros.data.frames import Frame
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 from objreg_tools.simulation.write import write_plan
 
 FRAMES = 180
@@ -42,7 +41,6 @@ def frame_costs(stores: Sequence[Path], frames: Sequence[Frame]) -> list[dict[st
 
     The stores are changed: they hold the first pass afterwards.
     """
-    warm(RegistrarParams())
     for store in stores:
         _pass(store, frames)
     rounds: list[list[dict[str, float]]] = []

@@ -26,10 +26,10 @@ from tqdm import tqdm
 
 from objreg_ros.bridge.messages import headers
 from objreg_ros.data.frames import Odometry
-from objreg_ros.keyframes.warm import drawn
 from objreg_ros.memory.store import Store, StoreError
 from objreg_tools.cli.live import private_environment
 from objreg_tools.cli.processes import Processes
+from objreg_tools.simulation.drawn_place import drawn
 
 SECOND = 1_000_000_000
 PERIOD_S, STEP_M = 0.15, 1.0  # between two frames

@@ -46,7 +46,6 @@ from sources import SIMULATED
 from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.geometry import inverse, pose_error, transform
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.warm import drawn
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of
 from objreg_ros.registration.engine import Engine
@@ -55,6 +54,7 @@ from objreg_ros.registration.propose.hypotheses import Hypothesis
 from objreg_ros.registration.propose.object_poses import from_shapes
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_tools.simulation.drawn_place import drawn
 from objreg_tools.simulation.params import StressParams
 from objreg_tools.simulation.rendering.render import render
 from objreg_tools.simulation.sensors.camera import KINECT

@@ -39,7 +39,6 @@ from objreg_ros.data.frames import UNNAMED, Frame
 from objreg_ros.geometry import inverse, pose_error, transform
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.keyframe import bounding_box
 from objreg_tools.truth import FALSE, Truth, within
 
@@ -237,7 +236,6 @@ def main(
         path = make()
         with read_source(path, detector_of(options["model"], options["threshold"]), options["seed"]) as source:
             params = RegistrarParams(seed=options["seed"]).replaced(**source.camera)
-            warm(params)
             rows[path.name] = measure(source.frames, source.truth, params, options["starts"])
         click.echo(line(path.name, summary(rows[path.name])))
         if out is not None:

@@ -44,7 +44,6 @@ from objreg_ros.registrar.exchange import Exchange
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 from objreg_tools.report.run.revisits import SeenPlace
 from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 from objreg_tools.simulation.write import simulate_fleet
@@ -318,7 +317,6 @@ def main(
     keep: Path,
 ) -> None:
     """Tie the robots of FOLDERS, and say how well."""
-    warm(PARAMS)
     paths = [*folders, *(simulated(int(seed), frames, keep) for seed in seeds.split(",") if seed)]
     figures: dict[str, Any] = {}
     for path in paths:

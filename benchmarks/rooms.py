@@ -51,7 +51,6 @@ from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_tools.report.run.revisits import SeenPlace, overlap
 from objreg_tools.simulation.write import simulate
@@ -186,7 +185,6 @@ def found_among(
 
 def close_loops(taken: Taken, params: RegistrarParams) -> dict[str, int]:
     """What the registrar makes of a recording beside what is in its store."""
-    warm(params)
     closures: list[LoopClosure] = []
     with closing(Registrar(params)) as registrar:
         for frame in moved_to(taken.frames, LATER_NS):

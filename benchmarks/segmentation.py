@@ -192,7 +192,6 @@ def measure(seed: int, clouds: Path, quick: bool) -> tuple[dict[str, Any], list[
     methods = {OURS: Segmenter(), PAPER: Segmenter(SegmenterParams(preset=PAPER))}
     with ProcessPoolExecutor(1, get_context("spawn")) as beside:  # where kernels are not compiled yet, it takes long
         rendered = beside.submit(_render, seed, 20 if quick else 100)
-        methods[OURS].warm()
         tables = list(labelled_clouds(clouds)) if clouds.is_dir() else []
         rooms = rendered.result()
     results: list[Result] = []

@@ -26,7 +26,6 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import Frame
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 
 VARIANTS = ("with_odometry", "without_odometry")
 
@@ -95,7 +94,6 @@ def table(name: str, row: dict[str, Any]) -> str:
 def main(recordings: tuple[Path, ...], threads: int, model: str, json_file: Path | None, seed: int) -> None:
     """Measure the stages of the registrar on RECORDINGS that have ground truth."""
     params = RegistrarParams(threads=threads)
-    warm(params)
     rows: dict[str, Any] = {}
     for path in recordings:
         with read_source(path, detector_of(model), seed) as source:

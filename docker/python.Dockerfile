@@ -18,12 +18,14 @@ RUN apt-get update \
 FROM system AS development
 # hadolint ignore=DL3008
 RUN apt-get update \
-    && apt-get install --yes --no-install-recommends chromium chromium-driver git \
+    && apt-get install --yes --no-install-recommends chromium chromium-driver g++ git \
     && rm -rf /var/lib/apt/lists/*
 USER 1000
 
 FROM system AS build
 WORKDIR /src
+# hadolint ignore=DL3008
+RUN apt-get update && apt-get install --yes --no-install-recommends g++ libc6-dev && rm -rf /var/lib/apt/lists/*
 RUN [[ "$(uname -m)" == x86_64 ]] \
     || { echo "expected x86_64, got $(uname -m): ROS has no wheels for it; build docker/ros.Dockerfile" >&2; exit 1; }
 COPY requirements/build.lock requirements/python3.12.lock requirements/
@@ -42,10 +44,8 @@ RUN /opt/objreg/bin/pip install --no-cache-dir --no-deps --no-build-isolation .
 
 FROM system
 COPY --from=build /opt/objreg /opt/objreg
-ENV PATH=/opt/objreg/bin:$PATH NUMBA_CACHE_DIR=/home/objreg/.cache/numba ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
+ENV PATH=/opt/objreg/bin:$PATH ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 USER 1000
-# The kernels are compiled for the processor that builds the image; on another kind the first run compiles them anew.
-RUN python -c 'from objreg_ros.registrar import warm; warm.warm(warm.RegistrarParams())'
 WORKDIR /data
 ENTRYPOINT ["objreg"]
 CMD ["--help"]

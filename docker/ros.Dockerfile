@@ -22,11 +22,7 @@ RUN apt-get update \
 RUN . /opt/ros/jazzy/setup.bash \
     && colcon build --base-paths src src/objreg_ros/objreg_msgs \
     && rm -rf build log
-ENV NUMBA_CACHE_DIR=/home/ubuntu/.cache/numba
 # The image's own user, ubuntu.
 USER 1000
-# The kernels are compiled for the processor that builds the image; on another kind the first start compiles them anew.
-RUN . /opt/ros/jazzy/setup.bash && . /ws/install/setup.bash \
-    && python3 -c 'from objreg_ros.registrar import warm; warm.warm(warm.RegistrarParams())'
 ENTRYPOINT ["/bin/bash", "-c", ". /opt/ros/jazzy/setup.bash && . /ws/install/setup.bash && exec \"$@\"", "ros"]
 CMD ["ros2", "launch", "objreg_ros", "objreg.launch.py"]

@@ -25,21 +25,16 @@ Each is a ROS node; `keyframer` and `mapper` are nodes too. `data` holds the typ
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
-
-from objreg_ros import kernel_cache
 
 if TYPE_CHECKING:
     from objreg_ros.library import Camera, Registration, register, register_clouds, register_keyframes, segment
-
-kernel_cache.settle(os.environ)
 
 __all__ = ["Camera", "Registration", "register", "register_clouds", "register_keyframes", "segment"]
 
 
 def __getattr__(name: str) -> Any:
-    """The public names, loaded when the first of them is asked for: a message needs no compiled kernels."""
+    """The public names, loaded when the first of them is asked for: a message needs none of what they load."""
     if name not in __all__:
         raise AttributeError(f"module 'objreg_ros' has no attribute {name!r}")
     from objreg_ros import library

@@ -27,7 +27,7 @@ RULES = {
     "distributed.scheduler.worker-saturation": 1.0,  # what waits is with no worker, so none of it dies with one
     "distributed.admin.low-level-log-length": 0,
 }
-ONE_THREAD = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 @dataclass(frozen=True, slots=True)

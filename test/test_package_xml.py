@@ -2,10 +2,9 @@
 """Every key of package.xml leads to something that Ubuntu 24.04 (noble) with Jazzy can install.
 
 Every key was looked up in rosdistro at 8468e88: `rosdep/base.yaml` and `rosdep/python.yaml` for the system's packages
-and pip's, and `jazzy/distribution.yaml` for ROS's, where it must be released. A rosdep key seldom says in which Ubuntu its package is
-(`ubuntu: [python3-numba]`, which noble has not), so look at packages.ubuntu.com/noble too. The versions in the table
-are those that noble is known by, not read from its archive: the workflow for Ubuntu 24.04, which installs them, is the
-proof.
+and pip's, and `jazzy/distribution.yaml` for ROS's, where it must be released. A rosdep key seldom says in which Ubuntu
+its package is, so look at packages.ubuntu.com/noble too. The versions in the table are those that noble is known by,
+not read from its archive: the workflow for Ubuntu 24.04, which installs them, is the proof.
 To add a key, look it up in all of these, then write it here.
 """
 
@@ -42,7 +41,6 @@ IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, 
     "python3-yaml": "python3-yaml 6.0.1",
 }
 ON_A_ROBOT = ("tools", "paper")  # the extras that package.xml brings
-BY_REQUIREMENTS = {"numba"}  # requirements/robot.txt: noble has no python3-numba, and rosdep no key of pip's for it
 OTHER_NAMES = {"opencv-python-headless": "opencv", "pillow": "pil", "pyyaml": "yaml"}
 
 
@@ -82,10 +80,9 @@ def test_messages_need_only_what_jazzy_has_released(repository: Path) -> None:
 
 
 def test_whatever_setup_py_asks_for_comes_with_a_robot_too(repository: Path) -> None:
-    by_requirements = (repository / "requirements/robot.txt").read_text()
     for name in required(repository, *ON_A_ROBOT):
         key = f"python3-{OTHER_NAMES.get(name, name)}"
-        assert key in IN_NOBLE or f"{key}-pip" in IN_NOBLE or f"\n{name}>=" in by_requirements, name
+        assert key in IN_NOBLE or f"{key}-pip" in IN_NOBLE, name
 
 
 def test_nobles_version_is_one_that_setup_py_takes(repository: Path) -> None:
@@ -102,10 +99,3 @@ def test_a_robot_is_asked_for_nothing_that_only_drawings_need(repository: Path) 
     on_robot = {element.text for element in root.iter("exec_depend")}
     only = set(required(repository, "report")) - set(required(repository))
     assert only == {"matplotlib", "plotly"} and not {f"python3-{name}" for name in only} & on_robot
-
-
-def test_what_requirements_bring_is_what_setup_py_asks_for(repository: Path) -> None:
-    lines = (repository / "requirements/robot.txt").read_text().splitlines()
-    assert {line for line in lines if not line.startswith("#")} == {
-        f"{name}>={required(repository)[name]}" for name in BY_REQUIREMENTS
-    }

@@ -5,5 +5,5 @@
 `gravity_filter` gravity as all frames know it; `jitter` is how far that path scatters. `fusion` makes one keyframe of
 the frames of a `frame_window`, and `own_size` bounds both; `recent` ones stay decoded. One that is sent is `quantised`,
 has `fewer_points` if it must, and is written by `columns`; `node` is the node of a keyframer, `params` has the
-parameters, `diagnostics` what the node reports, and `warm` compiles the kernels.
+parameters, `diagnostics` what the node reports.
 """

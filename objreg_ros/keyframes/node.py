@@ -18,7 +18,6 @@ from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.node.worker import Backlog, Limit
 from objreg_ros.bridge.process.intra_process import IntraProcessBus
-from objreg_ros.bridge.process.lifetime import await_kernels
 from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import read_key
 from objreg_ros.bridge.streams.params import KeyParams
@@ -29,7 +28,6 @@ from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import SILENCE_S, Keyframer
 from objreg_ros.keyframes.params import KeyframeParams, KeyframerNodeParams
-from objreg_ros.keyframes.warm import warm
 from objreg_ros.memory.compact import pack_keyframe
 
 LOOK_S = 1.0  # between two looks at whether frames still come
@@ -47,9 +45,8 @@ class KeyframerNode(FramesNode):
         super().__init__("keyframer", *kinds, bus=bus)
 
     def open(self) -> None:
-        """Load the kernels, publish and listen."""
+        """Publish and listen."""
         inputs, self._key = self.settings.of(KeyframerNodeParams), read_key(self.settings.of(KeyParams).key_file)
-        await_kernels(lambda: warm(self.settings.of(KeyframeParams)), self.get_logger().info)
         self._run = uuid.uuid4().hex
         self._keyframer = Keyframer(self.settings.of(KeyframeParams))
         self._tracking = threading.Lock()

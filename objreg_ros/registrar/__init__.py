@@ -8,6 +8,5 @@ keyframes; what a registered pair comes to is a `closure` or a refusal, or waits
 `relocalisation` says where the camera is in the map of an earlier session. Each camera of each robot has a
 `camera_track`; `origins` numbers the keyframes that were made elsewhere; `thinning` leaves out what would be said
 twice. An `exchange` sends the registrars of other robots a `summary` of each keyframe, and fetches what looks alike.
-`warm` compiles every kernel before the first frame comes; `params` has the parameters, `diagnostics` what the node
-reports, `node` is the node.
+`params` has the parameters, `diagnostics` what the node reports, `node` is the node.
 """

@@ -21,7 +21,6 @@ from objreg_ros.bridge.node.robots import prefixes_of
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.node.worker import Backlog, Limit
 from objreg_ros.bridge.process.intra_process import IntraProcessBus
-from objreg_ros.bridge.process.lifetime import await_kernels
 from objreg_ros.bridge.streams.announcements import Announcements
 from objreg_ros.bridge.streams.exchanging import Delivered, Exchanging
 from objreg_ros.bridge.streams.frames_in import FramesNode
@@ -39,7 +38,6 @@ from objreg_ros.registrar.origins import arrival_of
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 
 PATIENCE_S = 1.0  # a newer keyframe waits before the search in hand is cut short, if some were overtaken of late
 WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
@@ -73,10 +71,9 @@ class RegistrarNode(FramesNode):
         super().__init__("registrar", *kinds, RelocalisedParams, ManagedParams, bus=bus)
 
     def open(self) -> None:
-        """Load the kernels, open the store, publish and listen."""
+        """Open the store, publish and listen."""
         inputs, self._key = self.settings.of(RegistrarNodeParams), read_key(self.settings.of(KeyParams).key_file)
         self._seconds = inputs.limit
-        await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
         self._registrar = Registrar(self.settings.of(RegistrarParams))
         with ExitStack() as refused:  # a store that stays open could not be opened again
             refused.callback(self._registrar.close)

@@ -21,16 +21,15 @@ from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from sensor_msgs.msg import Imu as ImuMessage
 
-from objreg_ros.bridge.camera import colour_frame, lenses, registered_depth
+from objreg_ros.bridge.camera import colour_frame, lenses
 from objreg_ros.bridge.camera.calibration import fitted, read_calibration
 from objreg_ros.bridge.camera.transforms import receive_frames
-from objreg_ros.bridge.messages import from_msg, headers, motion_from_msg, rvl, to_msg, vision_to_msg
+from objreg_ros.bridge.messages import from_msg, headers, motion_from_msg, to_msg, vision_to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.overridable import FIXED
 from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.process.intra_process import IntraProcessBus, Surplus
-from objreg_ros.bridge.process.lifetime import await_kernels
 from objreg_ros.bridge.streams.detections_in import DetectionsIn
 from objreg_ros.bridge.streams.matching import view_streams
 from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream
@@ -60,10 +59,9 @@ class SegmenterNode(SynchronisedNode):
         super().__init__("segmenter", SegmenterParams, SegmenterNodeParams, ManagedParams, bus=bus)
 
     def open(self) -> None:
-        """Load the kernels, publish and listen."""
+        """Publish and listen."""
         self._inputs = self.settings.of(SegmenterNodeParams)
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
-        await_kernels(self._warm, self.get_logger().info)
         self._camera_info: Any = read_calibration(self._inputs.camera) if self._inputs.camera else None
         self._colour_info: Any = None
         self._detections = DetectionsIn(self, self._inputs.detections)
@@ -89,11 +87,6 @@ class SegmenterNode(SynchronisedNode):
             most_pixels=self.most_pixels,
         )
         return Pipeline(self._segmenter, self._inputs, receive_frames(self), host)
-
-    def _warm(self) -> None:
-        self._segmenter.warm()
-        registered_depth.warm()
-        rvl.warm()
 
     def _listen(self) -> None:
         self._listen_for_camera()

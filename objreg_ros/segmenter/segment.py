@@ -11,7 +11,7 @@ import numpy as np
 from objreg_ros import extra
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import Frame
-from objreg_ros.data.images import DepthImage, Detections, Intrinsics
+from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice, find_gravity
 from objreg_ros.segmenter.objects import boxes
 from objreg_ros.segmenter.objects.clouds import object_clouds, support_cloud
@@ -20,13 +20,11 @@ from objreg_ros.segmenter.objects.targets import Target, read_targets
 from objreg_ros.segmenter.objects.unnamed import find_unnamed
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.second_thread import SecondThread
-from objreg_ros.segmenter.sensor.depth_to_colour import warm as warm_offset
 from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
 from objreg_ros.segmenter.sensor.view import reduced_view, step_for
 from objreg_ros.segmenter.surface.cells import cell_size, reduce
 from objreg_ros.segmenter.surface.support import COARSE, Ground, find_supports
 
-WARM_SIZES = ((640, 480), (320, 240))  # two and one pixel a cell: each has a kernel of its own
 LARGEST_BLOCK = 24 << 20  # bytes
 
 
@@ -43,28 +41,8 @@ class Segmenter:
             extra.load("open3d", "paper", "preset: paper")
         self.choice = GravityChoice(None, 0.0, "nothing")
         self._beside = SecondThread("segmenter")
-        self.sensor = SensorEstimate()
-
-    def warm(self) -> None:
-        """Compile or load every kernel and claim memory, so that the first frame is as fast as the others."""
         _keep_memory()
-        for width, height in WARM_SIZES:
-            camera = Intrinsics(
-                fx=float(width), fy=float(width), cx=width / 2, cy=height / 2, width=width, height=height
-            )
-            colour = np.zeros((height, width, 3), np.uint8)
-            image = DepthImage(depth=_block_on_table(camera), rgb=colour, intrinsics=camera, stamp_ns=0)
-            block = np.array([[0.3, 0.25, 0.7, 0.75]], np.float32) * (width, height, width, height)
-            asked = Detections(
-                xyxy=block.astype(np.float32),
-                score=np.ones(1, np.float32),
-                label=("",),
-                image_hw=(height, width),
-                stamp_ns=0,
-            )
-            self.segment(asked, image)
-            warm_offset(image)
-        self.forget_stream()
+        self.sensor = SensorEstimate()
 
     def forget_stream(self) -> None:
         """Begin with another stream: nothing is known of its sensor."""
@@ -142,13 +120,3 @@ def _keep_memory() -> None:
     (mallopt(3), M_MMAP_THRESHOLD); the block is never touched, so it costs nothing. Elsewhere this does nothing.
     """
     np.empty(LARGEST_BLOCK, np.uint8)
-
-
-def _block_on_table(camera: Intrinsics) -> Array:
-    """Depth of a level surface seen from a metre above at half a right angle, with a block on it that has a pit."""
-    y = (np.arange(camera.height, dtype=np.float32)[:, None] - camera.cy) / camera.fy
-    depth = np.repeat(np.sqrt(2.0) / (1.0 + np.maximum(y, -0.6)), camera.width, axis=1).astype(np.float32)
-    h, w = camera.height // 8, camera.width // 8
-    depth[3 * h : 5 * h, 3 * w : 5 * w] *= 0.8
-    depth[4 * h : 4 * h + h // 4, 4 * w : 4 * w + w // 4] *= 1.1
-    return depth

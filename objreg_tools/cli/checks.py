@@ -10,7 +10,6 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import packages_distributions
@@ -18,7 +17,7 @@ from importlib.metadata import version as version_of
 from importlib.util import find_spec
 from pathlib import Path
 
-from objreg_ros import share
+from objreg_ros import native, share
 from objreg_ros.bridge.process.shared_memory import abandoned
 from objreg_tools.report.run.about import commit, version
 
@@ -30,7 +29,7 @@ LIBRARIES = {  # that Open3D loads, and the package of Debian and Ubuntu that ha
     "libX11.so.6": "libx11-6",
 }
 NEEDED = (
-    *("click", "cv2", "jinja2", "numba", "numpy", "onnxruntime"),
+    *("click", "cv2", "jinja2", "numpy", "onnxruntime"),
     *("PIL", "rosbags", "scipy", "tqdm", "yaml"),
 )
 EXTRAS = {  # module: the extra that brings it, and what for
@@ -44,7 +43,6 @@ EXTRAS = {  # module: the extra that brings it, and what for
 LEAST_DISK_BYTES = 1 << 29
 LEAST_SHARED_BYTES = 1 << 28  # four processes with the 64 MiB of config/fastdds.xml
 SHARED_MEMORY = Path("/dev/shm")
-KERNEL = "objreg_ros.registration.kernels.projection"
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,28 +213,13 @@ def _shared_memory() -> Check:
 
 
 def compiled_code() -> Check:
-    """Whether the kernels are compiled already, and whether they could be kept."""
+    """Which build of the kernels this processor takes, and whether it is there."""
     name = "compiled kernels"
     try:
-        folder = Path(import_module(KERNEL).moved.stats.cache_path)
-    except Exception as error:  # numba's own of a folder that there is not, or numba itself is broken
-        todo = "set NUMBA_CACHE_DIR to a folder that can be written: numba loads no kernel without one"
-        return Check("machine", name, f"cannot be loaded: {' '.join(str(error).split())}", todo, stops=True)
-    if not os.access(folder if folder.exists() else folder.parent, os.W_OK):
-        todo = "set NUMBA_CACHE_DIR to a folder that can be written"
-        return Check("machine", name, f"{folder} cannot be written", todo)
-    is_warm = any(folder.glob("*.nbi"))
-    todo = "set NUMBA_CACHE_DIR to a folder that stays: this one goes with a restart" if _is_passing(folder) else ""
-    found = f"{'there' if is_warm else 'none: the first run compiles for a minute'}, in {folder}"
-    return Check("machine", name, found, todo)
-
-
-def _is_passing(folder: Path) -> bool:
-    """Whether it lies in shared memory or in the temporary folder."""
-    places = [SHARED_MEMORY]
-    with suppress(OSError):  # no temporary folder
-        places.append(Path(tempfile.gettempdir()))
-    return any(map(folder.is_relative_to, places))
+        native.kernels("tracking")
+    except ImportError as error:
+        return Check("machine", name, "cannot be loaded", " ".join(str(error).split()), stops=True)
+    return Check("machine", name, native.chosen_build())
 
 
 def _size(count: int) -> str:

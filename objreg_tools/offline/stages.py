@@ -62,15 +62,12 @@ def build_stages(
 
     ``detects`` takes the place of the detector: what remembers pictures that it has seen before, say.
     """
+
     from objreg_ros import share
     from objreg_ros.detector.detector import Detector
     from objreg_ros.registrar.registrar import Registrar
-    from objreg_ros.registrar.warm import warm
     from objreg_ros.segmenter.segment import Segmenter
 
     detects = detects or Detector.of(detector, share.model)
-    segments = Segmenter(segmenter)
-    segments.warm()
-    warm(registrar)
     registers = Registrar(registrar)
-    return Stages(detects, segments, registers), registers.close
+    return Stages(detects, Segmenter(segmenter), registers), registers.close

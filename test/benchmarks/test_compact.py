@@ -8,7 +8,7 @@ import numpy as np
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.warm import drawn
+from objreg_tools.simulation.drawn_place import drawn
 
 
 def test_sizes_are_told_whole_and_within_the_bound_with_what_came_back() -> None:

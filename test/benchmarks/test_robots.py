@@ -13,7 +13,7 @@ import pytest
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import pose
-from objreg_ros.registrar.warm import drawn
+from objreg_tools.simulation.drawn_place import drawn
 from objreg_tools.truth import Truth, Truths
 
 SECOND = 10**9

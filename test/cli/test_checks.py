@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from objreg_ros import native
 from objreg_tools.cli import checks
 from objreg_tools.cli.checks import Check
 
@@ -94,7 +95,7 @@ def test_a_disk_without_a_place_for_what_is_temporary_stops_runs(monkeypatch: py
     monkeypatch.setattr("tempfile.gettempdir", nowhere)
     machine = {check.name: check for check in checks.of_machine()}
     check = machine["free disk for a while"]
-    assert "kernels" in machine["compiled kernels"].found
+    assert machine["compiled kernels"].found == native.chosen_build()
     assert check.stops and check.found.startswith("No usable temporary directory") and "TMPDIR" in check.todo
 
 
@@ -114,20 +115,15 @@ def test_shared_memory_of_killed_nodes_is_named(tmp_path: Path, monkeypatch: pyt
     assert "3 MiB of killed nodes" in checks._shared_memory().found
 
 
-def test_compiled_code_is_found_and_a_folder_that_cannot_be_written_is_advice(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "kernels" in checks.compiled_code().found
-    monkeypatch.setattr("os.access", lambda *_: False)
+def test_the_build_of_the_kernels_is_named_and_none_stops_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert checks.compiled_code().found in ("plain", "fast", "checked")
+
+    def absent(file: str) -> None:
+        raise ImportError("expected the kernels' build 'fast', got none: run  python setup.py build_ext --inplace")
+
+    monkeypatch.setattr("objreg_ros.native.kernels", absent)
     check = checks.compiled_code()
-    assert "cannot be written" in check.found and "NUMBA_CACHE_DIR" in check.todo and not check.stops
-
-
-def test_kernels_that_have_no_folder_at_all_stop_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nowhere(name: str) -> None:
-        raise RuntimeError("cannot cache function 'moved': no locator available")
-
-    monkeypatch.setattr(checks, "import_module", nowhere)
-    check = checks.compiled_code()
-    assert check.stops and "no locator available" in check.found and "NUMBA_CACHE_DIR" in check.todo
+    assert check.stops and "build_ext" in check.todo
 
 
 def test_the_first_lines_say_what_this_is() -> None:

@@ -11,8 +11,8 @@ from objreg_ros.keyframes.fewer_points import LEAST_POINTS, NEAREST_M, in_front,
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.warm import drawn
 from objreg_ros.registration.keyframe import Keyframe
+from objreg_tools.simulation.drawn_place import drawn
 
 
 def place() -> Keyframe:

@@ -25,7 +25,6 @@ Making = Callable[..., KeyframerNode]
 @pytest.fixture
 def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Making]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
-    monkeypatch.setattr("objreg_ros.keyframes.node.warm", lambda params: None)
 
     def made(*words: str) -> KeyframerNode:
         rclpy.init(args=["keyframer", "--ros-args", "-r", "__ns:=/robot1", *words])

@@ -25,8 +25,8 @@ from objreg_ros.memory import compact
 from objreg_ros.memory.compact import KEYFRAME, pack_keyframe, unpack_keyframe
 from objreg_ros.memory.envelope import FILTERS, FORMAT, PREFIX
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.warm import drawn
 from objreg_ros.registration.keyframe import Keyframe
+from objreg_tools.simulation.drawn_place import drawn
 
 Change = Callable[[dict[str, Any]], None]
 

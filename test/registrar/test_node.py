@@ -37,7 +37,6 @@ Making = Callable[[], RegistrarNode]
 @pytest.fixture
 def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Making]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
-    monkeypatch.setattr("objreg_ros.registrar.node.warm", lambda params: None)
     parameters = f"store:={tmp_path / 'place.db'}", "allow_remote_reset:=true"
     rclpy.init(args=["--ros-args", *(part for one in parameters for part in ("-p", one)), "-r", "__ns:=/test_node"])
 
@@ -376,7 +375,6 @@ def test_keyframes_are_exchanged_by_one_robot_that_its_namespace_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], got: str
 ) -> None:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
-    monkeypatch.setattr("objreg_ros.registrar.node.warm", lambda params: None)
     rclpy.init(args=["registrar", "--ros-args", "-p", "exchange:=/fleet", *words])
     try:
         with pytest.raises(ValueError, match=f"exchange: expected a namespace, which names one robot, got {got}"):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames that pass every check of a word and that no camera ever sent, through every kernel of the registrar.
 
-A program of its own: numba looks at indices only where a process begins with ``NUMBA_BOUNDSCHECK=1`` and compiles anew.
+A program of its own: kernels look at indices only where a process begins with ``OBJREG_CHECKED=1``, which is slower.
 Prints how many places were tried; an index beside its array is an IndexError, and its exit status 1.
 """
 
@@ -23,7 +23,7 @@ from objreg_ros.data.frames import Frame, ObjectCloud
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import drawn
+from objreg_tools.simulation.drawn_place import drawn
 
 MOST = limits.MOST_RANGE
 STEP_NS = 5_000_000_000

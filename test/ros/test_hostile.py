@@ -17,7 +17,7 @@ from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.messages.layout import OBJECTS
 from objreg_ros.data.frames import Frame
 from objreg_ros.data.images import Intrinsics
-from objreg_ros.registrar.warm import drawn
+from objreg_tools.simulation.drawn_place import drawn
 
 from .graph import Graph
 from .moments import CAMERA, SECOND

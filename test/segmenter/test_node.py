@@ -23,7 +23,6 @@ from objreg_ros.bridge.node import qos
 from objreg_ros.data.images import DepthImage, Detections, Intrinsics
 from objreg_ros.lens import Lens
 from objreg_ros.segmenter.node import LOOK_S, SegmenterNode
-from objreg_ros.segmenter.segment import Segmenter
 
 CAMERA = Intrinsics(fx=300.0, fy=300.0, cx=160.0, cy=120.0, width=320, height=240)
 NAMES = {0: "cup"}
@@ -81,7 +80,6 @@ class Camera:
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Iterator[Callable[[bool], Camera]]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    monkeypatch.setattr(Segmenter, "warm", lambda self: None)
     rclpy.init(args=["--ros-args", "-p", "colour:=false", *getattr(request, "param", ())])
     cameras: list[Camera] = []
 

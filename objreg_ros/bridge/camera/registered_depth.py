@@ -74,13 +74,6 @@ def register(
     )
 
 
-def warm() -> None:
-    """Load the kernels, or compile them, as `register` calls them."""
-    camera = Intrinsics(fx=1.0, fy=1.0, cx=0.0, cy=0.0, width=2, height=2)
-    depth = DepthImage(depth=np.ones((2, 2), np.float32), rgb=None, intrinsics=camera, stamp_ns=0)
-    register(depth, np.eye(4), camera)
-
-
 def moved(depth: Array, of: Intrinsics, T_to_of: Array, to: Intrinsics) -> Array:
     """Depth (H, W) float32 m of camera ``of`` as camera ``to`` has it (h, w), 0 where there is none."""
     R, t = T_to_of[:3, :3], T_to_of[:3, 3].astype(np.float32)

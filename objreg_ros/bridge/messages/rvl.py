@@ -43,8 +43,3 @@ def unpack(packed: NDArray[np.uint8]) -> NDArray[np.uint16]:
     if outcome == TOO_LONG:
         raise ValueError(f"compressed depth: expected {width} × {height} pixels, got an rvl stream that goes beyond")
     return pixels.reshape(height, width)
-
-
-def warm() -> None:
-    """Load the kernel, or compile it, as `unpack` calls it."""
-    unpack(np.array([1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0x01 << 4], np.uint8))

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import sys
 from collections.abc import Callable, Sequence
 
@@ -14,7 +13,6 @@ from rclpy.executors import SingleThreadedExecutor
 from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.process import profile, shared_memory
 from objreg_ros.bridge.process.lifetime import (
-    Abandoned,
     FirstSignal,
     begin,
     receive_first_signal,
@@ -29,7 +27,7 @@ def run(make: Callable[[], NodeBase], args: Sequence[str] | None = None) -> int:
     """Run one node until SIGINT or SIGTERM; the exit status.
 
     What ROS or the node refuses at start, and what cannot be written at the end (ValueError, OSError), is one line on
-    stderr and status 1. A bug propagates. A signal while kernels compile ends the process here.
+    stderr and status 1. A bug propagates.
     For the main thread of a process that ends with it: signals stay unheard.
     """
     return run_together((make,), args)
@@ -49,9 +47,6 @@ def run_together(makes: Sequence[Callable[[], NodeBase]], args: Sequence[str] | 
     try:
         with shutdown_as_interrupt():
             return _serve(makes, transport, first_signal)
-    except Abandoned:
-        rclpy.try_shutdown()
-        return _leave()
     except KeyboardInterrupt:  # before there was a node
         return 0
     finally:
@@ -63,13 +58,6 @@ def run_together(makes: Sequence[Callable[[], NodeBase]], args: Sequence[str] | 
 def _refuse(error: Exception) -> int:
     print(" ".join(str(error).split()), file=sys.stderr)
     return 1
-
-
-def _leave() -> int:
-    """End the process with status 0 and without Python's own end, which waits for every thread that compiles."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(0)
 
 
 def _serve(makes: Sequence[Callable[[], NodeBase]], transport: str, first_signal: FirstSignal) -> int:
@@ -111,8 +99,6 @@ def _spin(nodes: Sequence[NodeBase], executor: SingleThreadedExecutor, transport
             # a worker is seen with the next round, at the latest that of the diagnostics.
             while rclpy.ok() and not any(node.failure.done() for node in nodes):
                 executor.spin_once()
-    except Abandoned:
-        raise
     except KeyboardInterrupt:
         return
     for node in nodes:

@@ -7,10 +7,7 @@ import ctypes
 import gc
 import re
 import signal
-import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 import rclpy
@@ -21,8 +18,6 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 REFUSED = rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError
 SOURCE_LINE = re.compile(r",? at /\S+:\d+")  # of rcl's own code, in what it says
 SIGNALS = signal.SIGINT, signal.SIGTERM
-REPORT_S = 5.0  # between two lines of a work that goes on
-LOOK_S = 0.1  # a signal is received by then
 
 
 M_ARENA_MAX, ARENAS = -8, 2  # mallopt(3): of the GNU C library, which else has eight for each core
@@ -101,37 +96,3 @@ def shutdown_as_interrupt() -> Iterator[None]:
         if rclpy.ok() or UNCONVERTED not in str(error):
             raise
         raise KeyboardInterrupt from error
-
-
-class Abandoned(KeyboardInterrupt):
-    """A signal came while a thread was at work that nobody can stop."""
-
-
-def await_kernels(prepare: Callable[[], object], say: Callable[[str], object], report_s: float = REPORT_S) -> None:
-    """Let ``prepare`` load or compile the kernels of a node in a thread of its own; report the start and the progress.
-
-    A signal is received at once: what it interrupts raises `Abandoned`. What ``prepare`` raises is raised.
-    """
-    done: Future[None] = Future()
-
-    def work() -> None:
-        try:
-            prepare()
-        except BaseException as error:
-            done.set_exception(error)
-        else:
-            done.set_result(None)
-
-    say("loading the kernels; a first start compiles them, which takes minutes on a slow or busy machine")
-    thread, begun, reports = threading.Thread(target=work, name="kernels", daemon=True), time.monotonic(), 1
-    try:
-        thread.start()
-        while not done.done():
-            thread.join(LOOK_S)
-            lasted_s = time.monotonic() - begun
-            if lasted_s >= reports * report_s and not done.done():
-                say(f"still loading or compiling kernels, for {lasted_s:.0f} s now; Ctrl-C ends this at once")
-                reports = int(lasted_s / report_s) + 1
-    except KeyboardInterrupt as signalled:
-        raise Abandoned from signalled
-    done.result()

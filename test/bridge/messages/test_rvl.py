@@ -108,7 +108,3 @@ def test_noise_is_a_picture_or_refused() -> None:
             assert rvl.unpack(np.r_[claiming(5, 4, []), noise].astype(np.uint8)).shape == (4, 5)
         except ValueError as error:
             assert "compressed depth: expected 5 × 4 pixels" in str(error)
-
-
-def test_what_warms_the_kernel_is_a_picture() -> None:
-    rvl.warm()

@@ -6,8 +6,6 @@ from __future__ import annotations
 import gc
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -84,31 +82,6 @@ def test_a_signal_while_a_node_is_made_ends_it_at_once_with_status_0(number: sig
         return Short()
 
     assert run(make, []) == 0 and not went_on and not rclpy.ok()
-
-
-COMPILING = """
-import concurrent.futures, threading, time
-from objreg_ros.bridge.process.lifetime import await_kernels
-from objreg_ros.bridge.node.spin import run
-pool = concurrent.futures.ThreadPoolExecutor(1)  # Python waits for its threads at the end
-def prepare():
-    print("compiling", flush=True)
-    pool.submit(time.sleep, 60.0).result()
-run(lambda: await_kernels(prepare, print), [])
-"""
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_while_kernels_compile_ends_the_process_at_once_with_status_0(number: signal.Signals) -> None:
-    with subprocess.Popen([sys.executable, "-c", COMPILING], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        try:
-            while "compiling\n" not in process.stdout.readline():
-                assert process.poll() is None
-            process.send_signal(number)
-            assert process.wait(20.0) == 0
-        finally:
-            process.kill()
 
 
 def test_what_ros_says_of_a_node_that_a_signal_caught_half_made_is_no_bug() -> None:

@@ -3,19 +3,17 @@
 
 from __future__ import annotations
 
-import _thread
 import os
 import platform
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
 import rclpy
 from rclpy.executors import ExternalShutdownException
 
-from objreg_ros.bridge.process.lifetime import Abandoned, FirstSignal, await_kernels, begin, shutdown_as_interrupt
+from objreg_ros.bridge.process.lifetime import FirstSignal, begin, shutdown_as_interrupt
 
 
 def test_only_the_first_signal_interrupts() -> None:
@@ -47,37 +45,6 @@ def test_what_ros_says_because_it_was_shut_down_becomes_an_interruption() -> Non
 def test_a_bug_stays_a_bug() -> None:
     with pytest.raises(ZeroDivisionError), shutdown_as_interrupt():
         1 / 0  # noqa: B018
-
-
-def test_who_waits_for_kernels_is_told_before_and_while_they_compile() -> None:
-    said: list[str] = []
-    enough = threading.Event()
-
-    def say(line: str) -> None:
-        said.append(line)
-        if len(said) == 3:
-            enough.set()
-
-    await_kernels(lambda: enough.wait(10.0), say, report_s=0.01)
-    assert said[0].startswith("loading the kernels; a first start compiles them")
-    assert said[1].startswith("still loading or compiling kernels, for ") and len(said) >= 3
-
-
-def test_what_the_kernels_raise_is_raised() -> None:
-    with pytest.raises(ZeroDivisionError):
-        await_kernels(lambda: 1 / 0, str)
-
-
-def test_a_signal_while_kernels_compile_abandons_them() -> None:
-    compiled = threading.Event()
-
-    def compile_long() -> None:
-        _thread.interrupt_main()
-        compiled.wait(10.0)
-
-    with pytest.raises(Abandoned):
-        await_kernels(compile_long, str)
-    compiled.set()
 
 
 THREADS = """

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles or loads every kernel that tracks and fuses before the first frame comes."""
+"""A small drawn place, as the segmenter would give it: for trials that need a frame and no rendering."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,22 +9,8 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import Frame, ObjectCloud, View
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project
-from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.keyframes.keyframer import Keyframer
-from objreg_ros.keyframes.params import KeyframeParams
 
 CAMERA = Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120)
-
-
-def warm(params: KeyframeParams) -> None:
-    """Let a keyframer of its own, with odometry and without, meet a drawn place."""
-    for T_odom_camera in (None, np.eye(4)):
-        keyframer = Keyframer(params)
-        for stamp_ns in (0, 1):
-            keyframer.add_frame(replace(drawn(stamp_ns), T_odom_camera=T_odom_camera))
-        window = keyframer.finish_window()
-        if window is not None:
-            fuse(window, params)
 
 
 def drawn(stamp_ns: int) -> Frame:
