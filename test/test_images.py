@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -74,6 +75,13 @@ def test_a_workflow_tests_the_robots_workspace_on_arm64_too(repository: Path) ->
     assert "colcon test" in robot
 
 
+def test_a_workflow_builds_a_wheel_for_each_processor(repository: Path) -> None:
+    workflow = (repository / ".github/workflows/wheels.yml").read_text()
+    assert f"runner: [{AMD64}, {ARM64}]" in workflow and "cibuildwheel" in workflow
+    settings = tomllib.loads((repository / "pyproject.toml").read_text())["tool"]["cibuildwheel"]
+    assert settings["build"].startswith("cp311-") and "kernels(" in settings["test-command"]
+
+
 def test_the_image_of_wheels_says_on_arm64_which_other_to_build(repository: Path) -> None:
     commands = instructions(repository / "docker/python.Dockerfile", "RUN")
     (check,) = [command for command in commands if "uname -m" in command]
@@ -89,7 +97,7 @@ def test_the_lines_that_run_an_image_give_its_nodes_shared_memory(repository: Pa
     assert "--shm-size=" in head and "--ipc=host" in head
 
 
-@pytest.mark.parametrize("name", ["images", "jazzy"])
+@pytest.mark.parametrize("name", ["images", "jazzy", "wheels"])
 def test_actions_are_pinned_by_their_commit_and_pip_by_hashes(repository: Path, name: str) -> None:
     workflow = (repository / f".github/workflows/{name}.yml").read_text()
     used = re.findall(r"uses: (\S+)(.*)", workflow)
