@@ -5,6 +5,13 @@
 #include "objreg_ros/bridge/messages/native/rvl.hpp"
 #include "objreg_ros/keyframes/native/tracking.hpp"
 #include "objreg_ros/keyframes/native/turn.hpp"
+#include "objreg_ros/segmenter/surface/native/cells.hpp"
+#include "objreg_ros/segmenter/surface/native/components.hpp"
+#include "objreg_ros/segmenter/surface/native/holes.hpp"
+#include "objreg_ros/segmenter/surface/native/level.hpp"
+#include "objreg_ros/segmenter/surface/native/parts.hpp"
+#include "objreg_ros/segmenter/surface/native/seams.hpp"
+#include "objreg_ros/segmenter/surface/native/support.hpp"
 
 namespace objreg {
 struct File {
@@ -12,8 +19,15 @@ struct File {
   PyMethodDef *methods;
 };
 const File FILES[] = {
+    {"cells", cells::METHODS},
+    {"components", components::METHODS},
+    {"holes", holes::METHODS},
+    {"level", level::METHODS},
+    {"parts", parts::METHODS},
     {"registered_depth", registered_depth::METHODS},
     {"rvl", rvl::METHODS},
+    {"seams", seams::METHODS},
+    {"support", support::METHODS},
     {"tracking", tracking::METHODS},
     {"turn", turn::METHODS},
 };

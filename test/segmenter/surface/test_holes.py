@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.segmenter.surface.holes import _bounds, fill_holes
+from objreg_ros.segmenter.surface.holes import _KERNELS, fill_holes
 
 JUMP = (0.012, 0.008)
 
@@ -50,5 +50,5 @@ def test_the_bounds_are_those_of_all_rows_from_the_first_to_the_last() -> None:
     chosen = np.zeros((6, 9), bool)
     for row, column in ((0, 3), (2, 1), (2, 6), (3, 2)):
         chosen[row, column] = True
-    assert tuple(_bounds(chosen)) == (1, 0, 7, 4)
-    assert tuple(_bounds(np.zeros((6, 9), bool))) == (0, 0, 0, 0)
+    assert _KERNELS.bounds(chosen) == (1, 0, 7, 4)
+    assert _KERNELS.bounds(np.zeros((6, 9), bool)) == (0, 0, 0, 0)
