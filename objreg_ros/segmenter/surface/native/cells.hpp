@@ -5,6 +5,7 @@
 
 namespace objreg::cells {
 constexpr i64 REACH = 3;             // cells from the middle of a gradient to its ends
+constexpr i64 RING = 8;               // rows that a gradient needs at once, or more
 constexpr float MIN_COSINE = 0.1f;  // a surface seen flatter than this is not trusted with a larger area
 
 // A row of cells of 2 x 2 pixels.
@@ -19,9 +20,9 @@ inline void halve_row(const float *__restrict upper, const float *__restrict low
     const float limit = std::min(near + a + b * near * near, far);
     const float total =
         ((p < limit ? p : 0.0f) + (q < limit ? q : 0.0f)) + ((r < limit ? r : 0.0f) + (s < limit ? s : 0.0f));
-    const float count =
-        ((p < limit ? 1.0f : 0.0f) + (q < limit ? 1.0f : 0.0f)) + ((r < limit ? 1.0f : 0.0f) + (s < limit ? 1.0f : 0.0f));
-    cells[j] = total / std::max(count, 1.0f);
+    const i32 count =
+        ((p < limit ? -1 : 0) + (q < limit ? -1 : 0)) + ((r < limit ? -1 : 0) + (s < limit ? -1 : 0));
+    cells[j] = total / std::max(static_cast<float>(-count), 1.0f);
   }
 }
 
@@ -82,16 +83,26 @@ inline void shrink(View<const float, 2> depth, i64 step, float z_min, View<const
 // The mean of a cell of inverse depth `c` and of those of its two neighbours that are within `limit` of it.
 inline float mean_of_near(float c, float p, float q, float limit) {
   const bool g = std::abs(p - c) < limit, k = std::abs(q - c) < limit;
-  return (c + (g ? p : 0.0f) + (k ? q : 0.0f)) / (1.0f + (g ? 1.0f : 0.0f) + (k ? 1.0f : 0.0f));
+  const float share = g ? (k ? 1.0f / 3.0f : 0.5f) : (k ? 0.5f : 1.0f);
+  return (c + (g ? p : 0.0f) + (k ? q : 0.0f)) * share;
 }
 
-// A row's means with what is above and below it, and with what is left and right of it.
-inline void smooth_row(const float *__restrict above, const float *__restrict here, const float *__restrict below,
-                       i64 width, float a, float b, float *__restrict upright, float *__restrict flat) {
+// The inverse depth of a row, and its means with what is left and right of it.
+inline void invert_row(const float *__restrict depth, i64 width, float a, float b, float *__restrict near,
+                       float *__restrict flat) {
+  for (i64 j = 0; j < width; j++) near[j] = depth[j] > 0.0f ? 1.0f / depth[j] : 0.0f;
   for (i64 j = 1; j < width - 1; j++) {
-    const float c = here[j], limit = a * c * c + b;
-    upright[j] = mean_of_near(c, above[j], below[j], limit);
-    flat[j] = mean_of_near(c, here[j - 1], here[j + 1], limit);
+    const float c = near[j];
+    flat[j] = mean_of_near(c, near[j - 1], near[j + 1], a * c * c + b);
+  }
+}
+
+// A row's means with what is above and below it.
+inline void smooth_row(const float *__restrict above, const float *__restrict here, const float *__restrict below,
+                       i64 width, float a, float b, float *__restrict upright) {
+  for (i64 j = 1; j < width - 1; j++) {
+    const float c = here[j];
+    upright[j] = mean_of_near(c, above[j], below[j], a * c * c + b);
   }
 }
 
@@ -118,29 +129,29 @@ inline void normals_row(const float *__restrict near, const float *__restrict up
   }
 }
 
-// Fill `normals`, which is 0 before: gradients over REACH cells to both sides, of lines that are the mean of three; `fx`
-// and `fy` in cells. Where a line bends or breaks in its middle only its flatter half counts, so that edges stay sharp.
-// A depth step of a + b z² is one of a / z² + b in inverse depth.
+// Fill `normals`, which is 0 before: gradients over REACH cells to both sides, of lines that are the mean of three;
+// `fx` and `fy` in cells. Where a line bends or breaks in its middle only its flatter half counts, so that edges stay
+// sharp. A depth step of a + b z² is one of a / z² + b in inverse depth.
 inline void normals(View<const float, 2> depth, View<const float, 1> x, View<const float, 1> y, double fx, double fy,
                     float a, float b, View<float, 3> normals) {
   const i64 h = depth.shape[0], w = depth.shape[1];
   if (std::min(h, w) <= 2 * REACH) return;
   const float scale_x = static_cast<float>(fx / REACH), scale_y = static_cast<float>(fy / REACH);
-  Array<float, 2> near(h, w);
-  auto upright = zeros<float, 2>(h, w), flat = zeros<float, 2>(h, w);
-  for (i64 i = 0; i < h; i++) {
-    const float *__restrict z = depth.row(i).data;
-    float *__restrict out = near.row(i).data;
-    for (i64 j = 0; j < w; j++) out[j] = z[j] > 0.0f ? 1.0f / z[j] : 0.0f;
-  }
-  for (i64 i = 1; i < h - 1; i++)
-    smooth_row(near.row(i - 1).data, near.row(i).data, near.row(i + 1).data, w, a, b, upright.row(i).data,
-               flat.row(i).data);
+  // Of the last rows only, which stay in the processor's cache; the means are 0 at the rim of the image.
+  auto near = zeros<float, 2>(RING, w), flat = zeros<float, 2>(RING, w);
+  auto upright = zeros<float, 1>(w);
   const auto n_x = normals.row(0), n_y = normals.row(1), n_z = normals.row(2);
-  for (i64 i = REACH; i < h - REACH; i++)
-    normals_row(near.row(i).data, upright.row(i).data, flat.row(i - REACH).data, flat.row(i).data,
-                flat.row(i + REACH).data, x.data, y(i), w, scale_x, scale_y, a, b, n_x.row(i).data, n_y.row(i).data,
+  for (i64 last = 0; last < h; last++) {
+    invert_row(depth.row(last).data, w, a, b, near.row(last % RING).data, flat.row(last % RING).data);
+    if (last == 0 || last == h - 1) flat.row(last % RING).fill(0.0f);
+    const i64 i = last - REACH;
+    if (i < REACH) continue;
+    const float *here = near.row(i % RING).data;
+    smooth_row(near.row((i - 1) % RING).data, here, near.row((i + 1) % RING).data, w, a, b, upright.data);
+    normals_row(here, upright.data, flat.row((i - REACH) % RING).data, flat.row(i % RING).data,
+                flat.row(last % RING).data, x.data, y(i), w, scale_x, scale_y, a, b, n_x.row(i).data, n_y.row(i).data,
                 n_z.row(i).data);
+  }
 }
 
 inline PyMethodDef METHODS[] = {

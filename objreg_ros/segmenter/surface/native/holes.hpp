@@ -50,7 +50,8 @@ inline void fill(View<bool, 2> chosen, i64 left, i64 top, View<const float, 2> d
   for (i64 i = 0; i < h; i++) {
     for (i64 j = 0; j < w; j++) {
       const i32 k = labels(i, j);
-      if (k > 0 && depth(i, j) > 0.0f && smooth(k) > 0 && smooth(k) >= SMOOTH * pairs(k)) chosen(top + i, left + j) = true;
+      const bool within = k > 0 && depth(i, j) > 0.0f && smooth(k) > 0 && smooth(k) >= SMOOTH * pairs(k);
+      if (within) chosen(top + i, left + j) = true;
     }
   }
 }

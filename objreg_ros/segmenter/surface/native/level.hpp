@@ -122,23 +122,28 @@ inline bool find_beneath(View<const i32, 2> parts, View<const i64, 1> total, Vie
   return some;
 }
 
-inline void mark_row(const float *__restrict depth, const bool *__restrict possible, const float *__restrict x,
-                     i64 width, float n_x, float n_y, float n_z, float offset, float base, float limit,
-                     Tolerance tolerance, bool *__restrict level) {
+// Fill `flat` (w,): 1 where a cell of a row is within base + limit · tolerance of the plane, else 0.
+inline void find_flat(const float *__restrict depth, const float *__restrict x, i64 width, float n_x, float ahead,
+                      float offset, float base, float limit, Tolerance tolerance, i32 *__restrict flat) {
   for (i64 j = 0; j < width; j++) {
-    const float z = depth[j], height = z * (n_x * x[j] + n_y + n_z) + offset;
-    const bool flat = std::abs(height) < base + limit * (tolerance[0] + tolerance[1] * z * z);
-    level[j] = level[j] | (possible[j] & flat);
+    const float z = depth[j], height = z * (n_x * x[j] + ahead) + offset;
+    flat[j] = std::abs(height) < base + limit * (tolerance[0] + tolerance[1] * z * z) ? 1 : 0;
   }
 }
 
-// Mark the cells within base + limit · tolerance of the plane.
+// Mark the cells of `here` within base + limit · tolerance of the plane.
 inline void mark(View<const float, 2> depth, View<const float, 1> x, View<const float, 1> y, View<const bool, 2> here,
                  View<const float, 1> n, float offset, float base, float limit, Tolerance tolerance,
                  View<bool, 2> level) {
-  for (i64 i = 0; i < depth.shape[0]; i++)
-    mark_row(depth.row(i).data, here.row(i).data, x.data, depth.shape[1], n(0), n(1) * y(i), n(2), offset, base, limit,
-             tolerance, level.row(i).data);
+  const i64 w = depth.shape[1];
+  Array<i32, 1> flat(w);
+  for (i64 i = 0; i < depth.shape[0]; i++) {
+    find_flat(depth.row(i).data, x.data, w, n(0), n(1) * y(i) + n(2), offset, base, limit, tolerance, flat.data);
+    const auto *__restrict possible = reinterpret_cast<const u8 *>(here.row(i).data);
+    const i32 *__restrict found = flat.data;
+    auto *__restrict out = reinterpret_cast<u8 *>(level.row(i).data);  // 0 or 1: bits of bytes are quicker than bools
+    for (i64 j = 0; j < w; j++) out[j] = static_cast<u8>(out[j] | (possible[j] & found[j]));
+  }
 }
 
 inline PyMethodDef METHODS[] = {

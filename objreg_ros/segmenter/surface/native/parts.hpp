@@ -10,7 +10,7 @@ constexpr double DARK = 8.0;    // grey values that are added to each colour: wh
 
 using Window = std::array<i64, 4>;  // left, top, right, bottom in cells, half open
 
-struct Tables {  // of the parts: total, weight, size, pure, figure (K,); row 0 of the pairs is what is no part
+struct Tables {  // of pairs of parts, each (1 + K, 1 + K): row and column 0 are of what is no part
   Array<i64, 2> touching, front;
   Array<float, 2> gap;
 };
@@ -91,7 +91,7 @@ inline void sum_up(View<const i32, 2> labels, View<const i32, 1> number, Window 
   }
 }
 
-// Set `bit` of the pixels that have depth and are of another part than those that `other` and `far` begin with.
+// Set `bit` in `out` where a cell is of another part than its neighbour, of `other` and `far`, and both have depth.
 inline void find_in_row(const i32 *__restrict here, const float *__restrict z, const i32 *__restrict other,
                         const float *__restrict far, i64 width, i32 least, i32 bit, i32 *__restrict out) {
   for (i64 j = 0; j < width; j++) {
@@ -181,8 +181,8 @@ inline Array<bool, 2> find_alike(View<const double, 2> sums, bool coloured) {
 
 using Column = Array<double, 1>;
 
-// The fields of Parts, but for the rows 0 of extent, touching, gap and front, which are of what is no part. `rim` is how
-// much less a cell at the rim of the box counts than one in its middle.
+// The fields of Parts, but for the rows 0 of extent, touching, gap and front, which are of what is no part. `rim` is
+// how much less a cell at the rim of the box counts than one in its middle.
 inline std::tuple<Array<i32, 2>, Column, Column, Array<i64, 2>, Column, Column, Column, Array<bool, 2>, Array<i64, 2>,
                   Array<float, 2>, Array<i64, 2>>
 measure(View<const i32, 2> labels, i64 label_count, Window window, View<const float, 2> depth, View<const float, 1> x,
@@ -209,8 +209,9 @@ measure(View<const i32, 2> labels, i64 label_count, Window window, View<const fl
     figure(p) = static_cast<double>(shown + 1) / static_cast<double>(shown + hidden + 1);
   }
   auto alike = find_alike(sums, rgb.size() > 0);
-  return {std::move(renamed), std::move(total),  std::move(weight), std::move(extent),   std::move(size), std::move(pure),
-          std::move(figure),  std::move(alike),  std::move(touching), std::move(gap), std::move(front)};
+  return {std::move(renamed), std::move(total), std::move(weight), std::move(extent),
+          std::move(size),    std::move(pure),  std::move(figure), std::move(alike),
+          std::move(touching), std::move(gap),  std::move(front)};
 }
 
 inline PyMethodDef METHODS[] = {

@@ -8,8 +8,8 @@ namespace objreg::seams {
 using cells::REACH;
 constexpr float STEP = 0.5f;  // of a depth jump: the bend of the depth that is a step
 
-// Whether a surface over depth z is a valley, from the point x, y, s with the normal n to x, y, t with the normal m; d is
-// from the first to the second.
+// Whether a surface over depth z is a valley, from a point of depth s with the normal n to one of depth t with the
+// normal m; d_x and d_y are from the first to the second.
 inline bool is_valley(float d_x, float d_y, float s, float t, float z, float n_x, float n_y, float n_z, float m_x,
                       float m_y, float m_z, float bend, float jump) {
   const float d_z = t - s, dot = d_x * (m_x - n_x) + d_y * (m_y - n_y) + d_z * (m_z - n_z);
@@ -60,8 +60,8 @@ inline void find_across(Row far_up, const float *__restrict up, const float *__r
   }
 }
 
-// Fill `seams`, which is false before: the cells in a valley or at a step; `bend` is of a valley at 1 m, `a` and `b` of a
-// depth jump.
+// Fill `seams`, which is false before: the cells in a valley or at a step; `bend` is of a valley at 1 m, `a` and `b` of
+// a depth jump. Rows shifted against each other, so that the CPU's vectors see plain indices.
 inline void find(View<const float, 2> depth, View<const float, 3> normals, View<const float, 1> x,
                  View<const float, 1> y, float bend, float a, float b, View<bool, 2> seams) {
   const i64 h = depth.shape[0], w = depth.shape[1];

@@ -19,39 +19,42 @@ constexpr i64 ROUNDS = 6;                                   // as many as there 
 using Grid = std::tuple<View<const float, 2>, View<const float, 3>, View<const float, 1>, View<const float, 1>>;
 using Tolerance = std::array<float, 2>;  // a plane's: m, and its growth with the square of the depth, 1/m
 
+// `low` and `high` (w,) are the lowest and the highest level cell of each column so far.
 inline void survey_row(const float *__restrict depth, const float *__restrict n_x, const float *__restrict n_y,
                        const float *__restrict n_z, const float *__restrict x, float y, i64 width,
                        std::array<float, 3> up, float pixel, float *__restrict height, float *__restrict area,
-                       float &lowest, float &highest) {
-  constexpr float beyond = std::numeric_limits<float>::infinity();
-  float low = lowest, high = highest;
+                       float *__restrict low, float *__restrict high) {
   for (i64 j = 0; j < width; j++) {
     const float z = depth[j];
     const bool level = n_x[j] * up[0] + n_y[j] * up[1] + n_z[j] * up[2] > TILT;
     const float flat = std::max(std::abs(n_x[j] * x[j] + n_y[j] * y + n_z[j]), cells::MIN_COSINE);
     const float h = z * (up[0] * x[j] + up[1] * y + up[2]);
+    const float covered = z * z * pixel / flat;
     height[j] = h;
-    area[j] = level ? z * z * pixel / flat : 0.0f;
-    const float floor = level ? h : beyond, ceiling = level ? h : -beyond;
-    low = floor < low ? floor : low;
-    high = ceiling > high ? ceiling : high;
+    area[j] = level ? covered : 0.0f;
+    low[j] = level & (h < low[j]) ? h : low[j];
+    high[j] = level & (h > high[j]) ? h : high[j];
   }
-  lowest = low, highest = high;
 }
 
 // Fill the height along up and the m² of each level cell, 0 for the others; the lowest and the highest one.
 inline std::tuple<float, float> survey(Grid grid, View<const float, 1> up, float pixel, View<float, 2> height,
                                        View<float, 2> area) {
   const auto &[depth, normals, x, y] = grid;
+  const i64 w = depth.shape[1];
   const auto n_x = normals.row(0), n_y = normals.row(1), n_z = normals.row(2);
-  float low = std::numeric_limits<float>::infinity(), high = -low;
+  constexpr float beyond = std::numeric_limits<float>::infinity();
+  auto lows = full<float, 1>(beyond, w), highs = full<float, 1>(-beyond, w);
   for (i64 i = 0; i < depth.shape[0]; i++)
-    survey_row(depth.row(i).data, n_x.row(i).data, n_y.row(i).data, n_z.row(i).data, x.data, y(i), depth.shape[1],
-               {up(0), up(1), up(2)}, pixel, height.row(i).data, area.row(i).data, low, high);
+    survey_row(depth.row(i).data, n_x.row(i).data, n_y.row(i).data, n_z.row(i).data, x.data, y(i), w,
+               {up(0), up(1), up(2)}, pixel, height.row(i).data, area.row(i).data, lows.data, highs.data);
+  float low = beyond, high = -beyond;
+  for (i64 j = 0; j < w; j++) low = std::min(low, lows(j)), high = std::max(high, highs(j));
   return {low, high};
 }
 
-// The height in `low` ... `high`, in bins of `bin` m, that most `area` has, how much it is, and how many cells have any.
+// The height in `low` ... `high`, in bins of `bin` m, that most `area` has, how much it is, and how many cells have
+// any.
 inline std::tuple<double, double, i64> commonest(View<const float, 2> height, View<const float, 2> area, double low,
                                                  double high, double bin) {
   if (!(low <= high)) return {0.0, 0.0, 0};
@@ -74,27 +77,32 @@ inline std::tuple<double, double, i64> commonest(View<const float, 2> height, Vi
   return {low + (best - 0.5) * bin, most, count};
 }
 
-// Mark the cells of a plane and take them, and those just off it, out of `area`; the m² of the plane.
+// Fill `taken` (w,) with the m² of the plane's cells of a row, 0 for the others, and take them and those just off the
+// plane out of `area`; `ahead` is n_y y + n_z.
+inline void claim_row(const float *__restrict depth, const float *__restrict x, i64 width, float n_x, float ahead,
+                      float offset, Tolerance tolerance, float *__restrict area, float *__restrict taken) {
+  for (i64 j = 0; j < width; j++) {
+    const float z = depth[j], covered = area[j];
+    const float off = std::abs(z * (n_x * x[j] + ahead) + offset), unit = tolerance[0] + tolerance[1] * z * z;
+    taken[j] = off < unit ? covered : 0.0f;
+    area[j] = off < 1.5f * unit ? 0.0f : covered;
+  }
+}
+
+// Fill `cells` with where a plane is, and take those, and what is just off it, out of `area`, which is 0 or more; the
+// m² of the plane.
 inline double claim(View<const float, 2> depth, View<const float, 1> x, View<const float, 1> y,
                     View<const float, 1> n, float offset, Tolerance tolerance, View<float, 2> area,
                     View<bool, 2> cells) {
+  const i64 w = depth.shape[1];
+  Array<float, 1> taken(w);
   double total = 0.0;
   for (i64 i = 0; i < depth.shape[0]; i++) {
-    const auto row = depth.row(i);
-    const auto areas = area.row(i);
-    const auto marks = cells.row(i);
-    for (i64 j = 0; j < row.size(); j++) {
-      if (!(areas(j) > 0.0f)) continue;
-      const float z = row(j);
-      const float off = std::abs(z * (n(0) * x(j) + n(1) * y(i) + n(2)) + offset);
-      const float unit = tolerance[0] + tolerance[1] * z * z;
-      if (!(off < 1.5f * unit)) continue;
-      if (off < unit) {
-        marks(j) = true;
-        total += areas(j);
-      }
-      areas(j) = 0.0f;
-    }
+    claim_row(depth.row(i).data, x.data, w, n(0), n(1) * y(i) + n(2), offset, tolerance, area.row(i).data, taken.data);
+    const float *__restrict squares = taken.data;
+    bool *__restrict marks = cells.row(i).data;
+    for (i64 j = 0; j < w; j++) total += squares[j];
+    for (i64 j = 0; j < w; j++) marks[j] = squares[j] > 0.0f;
   }
   return total;
 }
@@ -167,7 +175,7 @@ inline double lowest_layer(View<const float, 1> heights, View<const float, 1> sh
 }
 
 struct Sums {  // of the samples within a limit: of weights times powers of s and t, and those times the error
-  float m = 0, m_s = 0, m_t = 0, m_ss = 0, m_st = 0, m_tt = 0, v = 0, v_s = 0, v_t = 0, square = 0, count = 0;
+  float m, m_s, m_t, m_ss, m_st, m_tt, v, v_s, v_t, square, count;
 };
 
 inline Sums sum_up(const float *__restrict sides, const float *__restrict others, const float *__restrict heights,
@@ -198,8 +206,8 @@ inline bool fit(View<const float, 2> samples, i64 size, i64 least, bool lowest, 
     const Sums of = sum_up(sides.data, others.data, heights.data, sharpness.data, size, c, a, b, shift, limit);
     if (of.count < least) return false;
     const double ridge = 1e-6 * of.m;
-    const auto step =
-        solve_symmetric({of.m + ridge, of.m_s, of.m_t, of.m_ss + ridge, of.m_st, of.m_tt + ridge}, {of.v, of.v_s, of.v_t});
+    const auto step = solve_symmetric({of.m + ridge, of.m_s, of.m_t, of.m_ss + ridge, of.m_st, of.m_tt + ridge},
+                                      {of.v, of.v_s, of.v_t});
     for (int d = 0; d < 3; d++) levels[d] += step[d];
     levels[3] = std::max(std::sqrt(of.square / of.count), 0.02f);
     shift = 0.0f;
