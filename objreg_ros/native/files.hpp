@@ -5,6 +5,13 @@
 #include "objreg_ros/bridge/messages/native/rvl.hpp"
 #include "objreg_ros/keyframes/native/tracking.hpp"
 #include "objreg_ros/keyframes/native/turn.hpp"
+#include "objreg_ros/segmenter/gravity/native/level_surfaces.hpp"
+#include "objreg_ros/segmenter/objects/native/extract.hpp"
+#include "objreg_ros/segmenter/objects/native/flags.hpp"
+#include "objreg_ros/segmenter/objects/native/selection.hpp"
+#include "objreg_ros/segmenter/objects/native/unnamed.hpp"
+#include "objreg_ros/segmenter/sensor/native/depth_to_colour.hpp"
+#include "objreg_ros/segmenter/sensor/native/view.hpp"
 #include "objreg_ros/segmenter/surface/native/cells.hpp"
 #include "objreg_ros/segmenter/surface/native/components.hpp"
 #include "objreg_ros/segmenter/surface/native/holes.hpp"
@@ -21,14 +28,21 @@ struct File {
 const File FILES[] = {
     {"cells", cells::METHODS},
     {"components", components::METHODS},
+    {"depth_to_colour", depth_to_colour::METHODS},
+    {"extract", extract::METHODS},
+    {"flags", flags::METHODS},
     {"holes", holes::METHODS},
     {"level", level::METHODS},
+    {"level_surfaces", level_surfaces::METHODS},
     {"parts", parts::METHODS},
     {"registered_depth", registered_depth::METHODS},
     {"rvl", rvl::METHODS},
     {"seams", seams::METHODS},
+    {"selection", selection::METHODS},
     {"support", support::METHODS},
     {"tracking", tracking::METHODS},
     {"turn", turn::METHODS},
+    {"unnamed", unnamed::METHODS},
+    {"view", view::METHODS},
 };
 }  // namespace objreg

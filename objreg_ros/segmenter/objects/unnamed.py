@@ -11,26 +11,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import PointFlag
 from objreg_ros.data.images import DepthImage
+from objreg_ros.native import kernels
 from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.objects.extract import Pixels, extract
 from objreg_ros.segmenter.objects.flags import whole_flags
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.surface.cells import EXACT, MIN_COSINE, Surface, Window
+from objreg_ros.segmenter.surface.cells import MIN_COSINE, Surface, Window
 from objreg_ros.segmenter.surface.components import connect, split
 from objreg_ros.segmenter.surface.seams import find_seams
 from objreg_ros.segmenter.surface.support import Ground
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
+_KERNELS = kernels("unnamed")
 MOST = 6  # unnamed objects of a frame
-REACH = 3  # cells that a support is thought to go on, and in which what is beyond a border is looked for
-NEAR = np.float32(1.5)  # tolerances of a plane within which a cell is of it
-TOP = np.float32(0.1)  # m²: a level part of less may be the top of an object
+TOLERANCE = PLANE_TOLERANCE_M, PLANE_TOLERANCE_GROWTH
 LEAST_CELLS = 20  # of the coarse grid
 GROWTH = 3  # rounds that parts grow over seams
 LEAST_SIZE, MOST_SIZE = 0.04, 1.0  # m: the longest side of an object
@@ -43,7 +42,7 @@ MOST_OUTSIDE = 0.15  # share of the border at the picture's
 MOST_TAKEN = 0.1  # share that is of a named object
 MOST_PERSON = 0.5  # share within the box of a person
 BESIDE = 6  # cells around an object that are compared to find a patch of a wall
-SUMS = 12
+SUMS = 12  # and their columns, as the kernel has them
 CELLS, DEPTH, TAKEN, SHOWN, HIDDEN, GOES_ON, OUTSIDE, STANDS, UNKNOWN, HEIGHT, BASE, BASES = range(SUMS)
 
 
@@ -108,60 +107,20 @@ def _level(ground: Ground) -> Array:
     """
     level = np.zeros(ground.coarse.depth.shape, np.bool_)
     for support in ground.supports:
-        plane = support.plane.normal.astype(np.float32), np.float32(support.plane.offset)
-        _mark_level(
-            ground.coarse.depth, ground.coarse.x, ground.coarse.y, support.parts, len(support.total), *plane, level
-        )
+        _KERNELS.mark_level(
+            ground.coarse.depth, ground.coarse.x, ground.coarse.y, support.parts, len(support.total),
+            support.plane.normal.astype(np.float32), support.plane.offset, TOLERANCE, MIN_COSINE, level,
+        )  # fmt: skip
     return level
-
-
-@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
-def _areas(depth, x, y, parts, count, n):  # type: ignore[no-untyped-def]
-    """The m² of each part of a plane."""
-    areas = np.zeros(count, np.float32)
-    pixel = (x[1] - x[0]) * (y[1] - y[0]) if min(len(x), len(y)) > 1 else np.float32(1)
-    for i in range(depth.shape[0]):
-        for j in range(depth.shape[1]):
-            if parts[i, j] > 0:
-                z = depth[i, j]
-                areas[parts[i, j]] += z * z * pixel / max(abs(n[0] * x[j] + n[1] * y[i] + n[2]), MIN_COSINE)
-    return areas
-
-
-@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
-def _mark_level(depth, x, y, parts, count, n, offset, level):  # type: ignore[no-untyped-def]
-    """Mark the cells on a plane that are no farther than REACH cells from its large parts, along both axes."""
-    h, w = depth.shape
-    areas = _areas(depth, x, y, parts, count, n)
-    wide = np.zeros((h, w), np.bool_)
-    for i in range(h):
-        free = 0
-        for j in range(w):
-            if areas[parts[i, j]] >= TOP:
-                for k in range(max(free, j - REACH), min(w, j + REACH + 1)):
-                    wide[i, k] = True
-                free = j + REACH + 1
-    near = np.empty(w, np.bool_)
-    for i in range(h):
-        near[:] = False
-        for p in range(max(0, i - REACH), min(h, i + REACH + 1)):
-            row = wide[p]
-            for j in range(w):
-                near[j] |= row[j]
-        for j in range(w):
-            z = depth[i, j]
-            off = abs(z * (n[0] * x[j] + n[1] * y[i] + n[2]) + offset)
-            level[i, j] |= near[j] & (z > 0) & (off < NEAR * (PLANE_TOLERANCE_M + PLANE_TOLERANCE_GROWTH * z * z))
 
 
 def _unnamed(labels: Array, count: int, around: _Surroundings, ground: Ground, jump: tuple[float, float]) -> list[Part]:
     """Those of the parts 1 … ``count`` of ``labels (h, w)`` that are objects."""
     grid = ground.coarse
     up = np.zeros(3, np.float32) if ground.up is None else ground.up.astype(np.float32)
-    bounds = np.float32(jump[0]), np.float32(jump[1])
     sums, extent = np.zeros((count + 1, SUMS)), np.zeros((count + 1, 4), np.int64)
     reach = np.zeros((count + 1, 2))
-    _survey(labels, around.level, around.taken, grid.depth, grid.x, grid.y, up, bounds, sums, extent, reach)
+    _KERNELS.survey(labels, around.level, around.taken, grid.depth, grid.x, grid.y, up, jump, sums, extent, reach)
     cells = np.maximum(sums[:, CELLS], 1)
     z = sums[:, DEPTH] / cells
     pitch = z * np.float64(grid.x[1] - grid.x[0] if len(grid.x) > 1 else 1.0)
@@ -192,71 +151,6 @@ def _is_within(chosen: Array, left: int, top: int, box: Box, step: int) -> bool:
     u0, v0, u1, v1 = (round(edge / step) for edge in box)
     inside = chosen[max(0, v0 - top) : max(0, v1 - top), max(0, u0 - left) : max(0, u1 - left)]
     return bool(inside.sum() > MOST_PERSON * chosen.sum())
-
-
-@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
-def _survey(labels, level, taken, depth, x, y, up, bounds, sums, extent, reach):  # type: ignore[no-untyped-def]
-    """Fill of each part its ``sums``, its ``extent`` in cells and the ``reach`` of its depth in m."""
-    h, w = labels.shape
-    for i in range(h):
-        for j in range(w):
-            k = labels[i, j]
-            if k == 0:
-                continue
-            z = depth[i, j]
-            row = sums[k]
-            if row[CELLS] == 0:
-                extent[k, 0], extent[k, 1], extent[k, 2], extent[k, 3] = j, i, j + 1, i + 1
-                reach[k, 0], reach[k, 1] = z, z
-            extent[k, 0], extent[k, 2] = min(extent[k, 0], j), max(extent[k, 2], j + 1)
-            extent[k, 3] = i + 1
-            reach[k, 0], reach[k, 1] = min(reach[k, 0], z), max(reach[k, 1], z)
-            row[CELLS] += 1
-            row[DEPTH] += z
-            row[TAKEN] += taken[i, j]
-            height = z * (up[0] * x[j] + up[1] * y[i] + up[2])
-            row[HEIGHT] += height
-            jump = bounds[0] + bounds[1] * z * z
-            if j == 0 or labels[i, j - 1] != k:
-                _look(labels, level, depth, x, y, up, i, j, 0, -1, k, z, height, jump, row)
-            if j == w - 1 or labels[i, j + 1] != k:
-                _look(labels, level, depth, x, y, up, i, j, 0, 1, k, z, height, jump, row)
-            if i == 0 or labels[i - 1, j] != k:
-                _look(labels, level, depth, x, y, up, i, j, -1, 0, k, z, height, jump, row)
-            if i == h - 1 or labels[i + 1, j] != k:
-                _look(labels, level, depth, x, y, up, i, j, 1, 0, k, z, height, jump, row)
-
-
-@numba.njit(cache=True, nogil=True, fastmath=EXACT)
-def _look(labels, level, depth, x, y, up, i, j, down, right, k, z, height, jump, row):  # type: ignore[no-untyped-def]
-    """Count what lies beyond the border of part k at cell (i, j), of a ``height``, in one direction."""
-    p, q = i, j
-    for step in range(REACH):
-        p, q = p + down, q + right
-        if p < 0 or q < 0 or p >= depth.shape[0] or q >= depth.shape[1]:
-            row[OUTSIDE if step < 2 else UNKNOWN] += 1
-            return
-        other = depth[p, q]
-        if other <= 0:
-            continue
-        if labels[p, q] == k:  # beyond a hole
-            row[UNKNOWN] += 1
-            return
-        if other - z >= jump:
-            row[SHOWN] += 1
-            return
-        if z - other >= jump:
-            row[HIDDEN] += 1
-            return
-        beyond = other * (up[0] * x[q] + up[1] * y[p] + up[2])
-        if level[p, q] and height > beyond - np.float32(0.5) * jump:
-            row[STANDS] += 1
-            row[BASE] += beyond
-            row[BASES] += 1
-        else:
-            row[GOES_ON] += 1
-        return
-    row[UNKNOWN] += 1
 
 
 def _cut(image: DepthImage, grid: Surface, one: Part, params: SegmenterParams) -> UnnamedPixels | None:

@@ -14,20 +14,20 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import cv2
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.limits import MOST_DEPTH
+from objreg_ros.native import kernels
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M, depth_noise, thinned
 
+_KERNELS = kernels("depth_to_colour")
 WIDTH = 320  # px: the picture is halved until it is no wider
 POINTS = 1500  # most depth steps that are asked
 LEAST_POINTS = 400  # fewer give no result
 LEAST_STRENGTH = 0.2  # of the gradients at the steps, in deviations, for these to be edges; real ones have 0.3 to 1
 STEP = (3.0 * PLANE_TOLERANCE_M, 3.0 * PLANE_TOLERANCE_GROWTH)  # m and 1/m: depths that differ by more are a step
-SHADOW = 3  # px: the depth behind a step may be missing for as far; behind wider shadows it is another object's
 BLURS = (3.0, 1.5, 0.8)  # px of the reduced picture, coarse to fine
 COARSE = (np.linspace(-0.05, 0.05, 9), np.linspace(-0.04, 0.04, 5))  # rad: about x and y, about z
 STEPS = ((0.012, 0.006), (0.006, 0.003), (0.002, 0.001))  # rad, of each blur
@@ -40,8 +40,6 @@ MOST_INDEPENDENT = 150.0  # independent steps of a frame, at most
 SURPRISE = 3.0  # deviations: a larger difference is clipped to this
 MEMORY = 20  # frames that are remembered
 FIRST_FRAMES = 0.2  # the weight of the first guess of the spread, in frames
-LEAST_AWAY = 0.1  # m before the camera, of a ray that is 1 m long along the other's axis: else it looks aside
-FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}  # fast arithmetic that still knows NaN
 MATCHED = 1.5  # noise of depth in a Kinect's: simulated and real Kinects have 0.9 to 1.4, a RealSense D435 1.8 and more
 SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
@@ -130,7 +128,7 @@ def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None
     assert image.rgb is not None
     every = max(1, image.depth.shape[1] // WIDTH)
     depth, camera = np.ascontiguousarray(image.depth[::every, ::every]), _reduced(image.intrinsics, every)
-    rays = _steps(depth, *camera, *STEP)
+    rays = _KERNELS.steps(depth, *camera, *STEP)
     if len(rays) < LEAST_POINTS:
         return None
     independent = min(INDEPENDENT * len(rays), MOST_INDEPENDENT)
@@ -141,17 +139,17 @@ def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None
     for k, blur in enumerate(BLURS):
         picture = cv2.GaussianBlur(strength, (0, 0), blur)
         if k == 0:
-            rotation = _coarse(np.ascontiguousarray(rays[::3]), picture, camera, mean, weight, *COARSE)
-        rotation = _climbed(rays, picture, camera, mean, weight, rotation, np.array(STEPS[k]), ROUNDS)
-        if k == 0 and _score(rays, picture, camera, mean, np.zeros(3), rotation) < LEAST_STRENGTH:
+            rotation = _KERNELS.coarse(np.ascontiguousarray(rays[::3]), picture, camera, mean, weight, *COARSE)
+        rotation = _KERNELS.climbed(rays, picture, camera, mean, weight, rotation, np.array(STEPS[k]), ROUNDS)
+        if k == 0 and _KERNELS.score(rays, picture, camera, mean, np.zeros(3), rotation) < LEAST_STRENGTH:
             return None  # the steps lie upon no edges
     return rotation
 
 
 def turned(image: DepthImage, rotation: Array) -> DepthImage:
     """The image with its depth as the colour camera would see it, ``rotation (3,)`` rad away from the depth camera."""
-    camera = image.intrinsics
-    depth = _turned(image.depth, camera.fx, camera.fy, camera.cx, camera.cy, np.asarray(rotation, np.float64))
+    camera = _reduced(image.intrinsics, 1)
+    depth = _KERNELS.turned(image.depth, camera, np.asarray(rotation, np.float64), MOST_DEPTH)
     return replace(image, depth=depth)
 
 
@@ -183,116 +181,3 @@ def _strength(grey: Array) -> Array:
     strength = np.sqrt(cv2.magnitude(cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)))
     strength -= cv2.GaussianBlur(strength, (0, 0), BACKGROUND)
     return np.asarray(strength / max(float(strength.std()), 1e-6))
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _steps(depth, fx, fy, cx, cy, base, growth):  # type: ignore[no-untyped-def]
-    """The rays (N, 2), x and y at z = 1, of the depth steps along rows and columns, half a pixel off the near side."""
-    height, width = depth.shape
-    at, n = np.empty((2 * height * width, 2)), 0
-    for row in range(2, height - 2):
-        first, n = n, _steps_along(depth[row], at, n, 0, base, growth)
-        at[first:n, 1] = row
-    for column in range(2, width - 2):
-        first, n = n, _steps_along(depth[:, column], at, n, 1, base, growth)
-        at[first:n, 0] = column
-    rays = at[:n]
-    for k in range(n):
-        rays[k, 0], rays[k, 1] = (rays[k, 0] - cx) / fx, (rays[k, 1] - cy) / fy
-    return rays
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _steps_along(line, at, n, axis, base, growth):  # type: ignore[no-untyped-def]
-    """Add where measured depths step that follow each other along a line, `SHADOW` apart at most; returns how many."""
-    last = -1
-    for k in range(len(line)):
-        z = line[k]
-        if z <= 0.0:
-            continue
-        if last >= 0 and k - last <= SHADOW:
-            before = line[last]
-            closer = min(z, before)
-            if abs(z - before) > (base + growth * closer * closer) * (k - last):
-                at[n, axis] = last + 0.5 if before < z else k - 0.5
-                n += 1
-        last = k
-    return n
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
-def _score(rays, picture, camera, mean, weight, rotation):  # type: ignore[no-untyped-def]
-    """The mean strength of the gradients where turned rays land, less what the prior says against the rotation."""
-    fx, fy, cx, cy = camera
-    a, b, c = rotation[0], rotation[1], rotation[2]
-    height, width = picture.shape
-    total = 0.0
-    for k in range(len(rays)):
-        x, y = rays[k, 0], rays[k, 1]
-        z = 1.0 + a * y - b * x
-        u, v = fx * (x + b - c * y) / z + cx, fy * (y + c * x - a) / z + cy
-        if not (u >= 0.0 and v >= 0.0 and u < width - 1.0 and v < height - 1.0):
-            continue
-        left, top = int(u), int(v)
-        p, q = u - left, v - top
-        upper = (1.0 - p) * picture[top, left] + p * picture[top, left + 1]
-        lower = (1.0 - p) * picture[top + 1, left] + p * picture[top + 1, left + 1]
-        total += (1.0 - q) * upper + q * lower
-    against = 0.0
-    for k in range(3):
-        against += ((rotation[k] - mean[k]) * weight[k]) ** 2
-    return total / len(rays) - 0.5 * against
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _coarse(rays, picture, camera, mean, weight, across, around):  # type: ignore[no-untyped-def]
-    """The best rotation (3,) of a grid about the mean, ``across`` about x and y, ``around`` about z."""
-    best, chosen, trial = -np.inf, mean.copy(), np.empty(3)
-    for a in across:
-        for b in across:
-            for c in around:
-                trial[0], trial[1], trial[2] = mean[0] + a, mean[1] + b, mean[2] + c
-                found = _score(rays, picture, camera, mean, weight, trial)
-                if found > best:
-                    best = found
-                    chosen[:] = trial
-    return chosen
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _climbed(rays, picture, camera, mean, weight, rotation, steps, rounds):  # type: ignore[no-untyped-def]
-    """A rotation brought to where the score is highest, an axis at a time."""
-    rotation = rotation.copy()
-    best, trial = _score(rays, picture, camera, mean, weight, rotation), rotation.copy()
-    for step in steps:
-        for _ in range(rounds):
-            improved = False
-            for k in range(6):
-                trial[:] = rotation
-                trial[k // 2] += step if k % 2 == 0 else -step
-                found = _score(rays, picture, camera, mean, weight, trial)
-                if found > best:
-                    best, improved = found, True
-                    rotation[:] = trial
-            if not improved:
-                break
-    return rotation
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
-def _turned(depth, fx, fy, cx, cy, rotation):  # type: ignore[no-untyped-def]
-    """Depth (H, W) as a camera sees it from which the depth camera is turned away; the nearest pixel's, 0 beyond."""
-    height, width = depth.shape
-    a, b, c = rotation[0], rotation[1], rotation[2]
-    out = np.zeros_like(depth)
-    for row in range(height):
-        y = (row - cy) / fy
-        for column in range(width):
-            x = (column - cx) / fx
-            away = 1.0 - a * y + b * x  # the rotation back, of a ray of the colour camera
-            u, v = fx * (x - b + c * y) / away + cx, fy * (y - c * x + a) / away + cy
-            if not (away > LEAST_AWAY and u > -0.5 and v > -0.5 and u < width - 0.5 and v < height - 0.5):
-                continue
-            z = depth[int(v + 0.5), int(u + 0.5)] / away
-            out[row, column] = z if z <= MOST_DEPTH else 0.0
-    return out

@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import cv2
-import numba
 import numpy as np
 
 from objreg_ros import limits
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import View
 from objreg_ros.data.images import DepthImage, Intrinsics
+from objreg_ros.native import kernels
 
+_KERNELS = kernels("view")
 BETWEEN = np.array([-1.0, 9.0, 9.0, -1.0]) / 16.0  # of four pixels: what is between the two in the middle
 LEAST_WIDTH = 160  # px: what a narrower view holds is too coarse to locate a pose
 
@@ -36,22 +37,9 @@ def reduced_view(image: DepthImage, step: int, z_min: float, z_max: float) -> Vi
     depth = np.ascontiguousarray(image.depth[first::step, first::step])
     x = ((np.arange(camera.width) - camera.cx) / camera.fx).astype(np.float32)
     y = ((np.arange(camera.height) - camera.cy) / camera.fy).astype(np.float32)
-    xyz = np.empty((*depth.shape, 3), np.float32)
-    _back_project(depth, x, y, np.float32(max(z_min, limits.LEAST_RANGE)), np.float32(z_max), xyz)
+    xyz = _KERNELS.back_project(depth, x, y, max(z_min, limits.LEAST_RANGE), z_max)
     grey = None if image.rgb is None else _grey(image.rgb, step)
     return View(xyz=xyz, grey=grey, intrinsics=camera)
-
-
-@numba.njit(cache=True, nogil=True)
-def _back_project(depth, x, y, z_min, z_max, xyz):  # type: ignore[no-untyped-def]
-    for i in range(depth.shape[0]):
-        for j in range(depth.shape[1]):
-            z = depth[i, j]
-            if not (z > z_min and z < z_max):
-                z = np.float32(np.nan)
-            xyz[i, j, 0] = x[j] * z
-            xyz[i, j, 1] = y[i] * z
-            xyz[i, j, 2] = z
 
 
 def _grey(rgb: Array, step: int) -> Array:

@@ -12,7 +12,7 @@ from objreg_ros.data.frames import PointFlag
 from objreg_ros.data.images import DepthImage
 from objreg_ros.segmenter.objects.boxes import Box
 from objreg_ros.segmenter.objects.extract import Pixels
-from objreg_ros.segmenter.objects.flags import MIN_CELLS, _fit_plane, whole_flags
+from objreg_ros.segmenter.objects.flags import _KERNELS, MIN_CELLS, whole_flags
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.surface.cells import Window
 from segmenter.scenes import SMALL, Scene, two_boxes
@@ -154,7 +154,7 @@ def test_a_plane_that_leans_both_ways_is_found_in_a_corner_of_it() -> None:
     depth = (1.0 / (0.3 * x - 0.2 * y[:, None] + 0.5)).astype(np.float32)
     chosen = np.add.outer(np.arange(48), np.arange(64)) < 50
     slope = np.sqrt(0.3**2 + 0.2**2 + 0.5**2)
-    assert _fit_plane(depth, x, y, chosen) == pytest.approx((0.3, -0.2, 0.5, slope), abs=1e-4)
+    assert _KERNELS.fit_plane(depth, x, y, chosen) == pytest.approx((0.3, -0.2, 0.5, slope), abs=1e-4)
 
 
 @pytest.mark.parametrize(("column", "is_cut"), [(30, True), (43, True), (44, False), (200, False)])
