@@ -84,7 +84,8 @@ inline std::array<i32, 2> mark_own(i64 n, const float *__restrict row, const flo
     const float z = row[u];
     const bool known = (z > 0) & (z < FAR_M);
     const bool agrees = (std::abs(cell[u] - z) < a + b * z * z) & (cell[u] > 0) & known;
-    const u8 mark = agrees ? own[u] : u8{0}, open = known & !agrees ? possible[u] : u8{0};
+    const u8 own_here = own[u], possible_here = possible[u];  // no branches around what is read: for the vectors
+    const u8 mark = agrees ? own_here : u8{0}, open = known & !agrees ? possible_here : u8{0};
     marks[u] = mark, open_ends[u] = open;
     found += mark, doubtful += open;
   }
@@ -131,7 +132,8 @@ inline std::array<i64, 2> keep(const u8 *__restrict above, const u8 *__restrict 
     const u8 beside = here[u] + here[u + 2] + above[u + 1] + below[u + 1];
     const u8 across = above[u] + above[u + 2] + below[u] + below[u + 2];
     const u8 around = beside + across;
-    out[u] = around >= MIN_NEIGHBOURS ? here[u + 1] : u8{0};
+    const u8 marked = here[u + 1];
+    out[u] = around >= MIN_NEIGHBOURS ? marked : u8{0};
   }
   i64 first = 0, end = kept.size();
   while (first < end && !kept(first)) first++;
