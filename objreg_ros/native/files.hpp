@@ -5,6 +5,9 @@
 #include "objreg_ros/bridge/messages/native/rvl.hpp"
 #include "objreg_ros/keyframes/native/tracking.hpp"
 #include "objreg_ros/keyframes/native/turn.hpp"
+#include "objreg_ros/registration/shapes/native/shape.hpp"
+#include "objreg_ros/registration/shapes/native/silhouette.hpp"
+#include "objreg_ros/registration/shapes/native/silhouette_score.hpp"
 #include "objreg_ros/segmenter/gravity/native/level_surfaces.hpp"
 #include "objreg_ros/segmenter/objects/native/extract.hpp"
 #include "objreg_ros/segmenter/objects/native/flags.hpp"
@@ -39,6 +42,9 @@ const File FILES[] = {
     {"rvl", rvl::METHODS},
     {"seams", seams::METHODS},
     {"selection", selection::METHODS},
+    {"shape", shape::METHODS},
+    {"silhouette", silhouette::METHODS},
+    {"silhouette_score", silhouette_score::METHODS},
     {"support", support::METHODS},
     {"tracking", tracking::METHODS},
     {"turn", turn::METHODS},

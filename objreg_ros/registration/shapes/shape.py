@@ -9,20 +9,19 @@ from functools import cached_property
 from typing import Any
 
 import cv2
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import PointFlag
 from objreg_ros.geometry import pose
+from objreg_ros.native import kernels
 from objreg_ros.registration.kernels.closest_points import IndexedSurface, prepare_surface
-from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.shapes.silhouette import Silhouette, draw
 
+_KERNELS = kernels("shape")
 EDGE = np.uint16(PointFlag.EDGE)
 LEAST = 30  # points of a shape
-LEVEL = 0.9  # cosine of a surface that objects stand on with up
 CLEAR = 0.005  # m: what an object stands on is at most so much higher than the lowest that is seen of it
 STEP = 0.02  # m: a level surface lies within as much of height
 SEEN = 5  # points of the context that make one
@@ -162,7 +161,7 @@ def _layer(keyframe: Keyframe, index: int, R_upright_camera: Array) -> Array:
     middle = points.mean(axis=0)
     beside = np.array([middle[:2] - WIDE, middle[:2] + WIDE], np.float32)
     around = keyframe.context.xyz, keyframe.context.normals, R
-    layer = _level(*around, beside, NOWHERE, foot - THICK[0], foot + THICK[0])
+    layer = _KERNELS.level(*around, beside, NOWHERE, foot - THICK[0], foot + THICK[0])
     return np.asarray(layer - np.median(layer, axis=0) if len(layer) else layer, float)
 
 
@@ -181,7 +180,7 @@ def _footing(keyframe: Keyframe, points: Array, R: Array) -> float:
     level = np.ascontiguousarray(points[:, :2].T)
     box = np.array([level.min(axis=1), level.max(axis=1)])
     grown = (box + np.array([[-AROUND], [AROUND]], np.float32)), (box + np.array([[-BESIDE], [BESIDE]], np.float32))
-    around = _level(keyframe.context.xyz, keyframe.context.normals, R, *grown, -np.inf, lowest + CLEAR)
+    around = _KERNELS.level(keyframe.context.xyz, keyframe.context.normals, R, *grown, -np.inf, lowest + CLEAR)
     heights = np.sort(around[:, 2])
     within = np.arange(1, len(heights) + 1) - np.searchsorted(heights, heights - STEP, side="right")
     layers = np.flatnonzero(within >= max(SEEN, LAYER * within.max(initial=0)))
@@ -196,25 +195,6 @@ def _rim(values: Array) -> tuple[float, float]:
     ordered = np.sort(values)
     low, high = np.interp(np.array(RIM) * (len(ordered) - 1), np.arange(len(ordered)), ordered)
     return float(low), float(high)
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
-def _level(xyz, normals, R, within, beyond, low, high):  # type: ignore[no-untyped-def]
-    """The points (n, 3) float32 of level surfaces in upright axes: within a box, beyond another, between two heights.
-
-    A box (2, 2) is the least and the most of x and y.
-    """
-    found, n = np.empty((len(xyz), 3), np.float32), 0
-    for i in range(len(xyz)):
-        if R[2, 0] * normals[i, 0] + R[2, 1] * normals[i, 1] + R[2, 2] * normals[i, 2] <= LEVEL:
-            continue
-        for k in range(3):
-            found[n, k] = R[k, 0] * xyz[i, 0] + R[k, 1] * xyz[i, 1] + R[k, 2] * xyz[i, 2]
-        x, y, z = found[n, 0], found[n, 1], found[n, 2]
-        inside = (x > within[0, 0]) & (y > within[0, 1]) & (x < within[1, 0]) & (y < within[1, 1])
-        outside = (x < beyond[0, 0]) | (y < beyond[0, 1]) | (x > beyond[1, 0]) | (y > beyond[1, 1])
-        n += inside & outside & (z > low) & (z < high)
-    return found[:n]
 
 
 def upright_pose(source: Shape, target: Shape, motion: Array) -> Array:

@@ -11,13 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import View
+from objreg_ros.native import kernels
 from objreg_ros.sensor import silhouette_tolerance
 
+_KERNELS = kernels("silhouette")
 BESIDE, INSIDE, RIM = 0, 1, 2  # the values of a silhouette's mask
 FINEST = 4.0  # pixels of a silhouette for one of the view
 MARGIN = 6  # px around the object
@@ -52,13 +53,13 @@ def draw(xyz: Array, grey: Array, view: View, noise: float = 1.0) -> Silhouette:
     scale = _scale(xyz, view)
     camera = view.intrinsics
     lens = np.array([camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]) * scale
-    u, v = (lens[k] * xyz[:, k] / xyz[:, 2] + lens[2 + k] for k in (0, 1))
+    u, v = (lens[k] * xyz[:, k].astype(float) / xyz[:, 2] + lens[2 + k] for k in (0, 1))
     left, top = (max(0, int(np.floor(c.min())) - MARGIN) for c in (u, v))
     width, height = (int(np.ceil(n * scale)) for n in (camera.width, camera.height))
     right, bottom = min(width, int(u.max()) + MARGIN + 1), min(height, int(v.max()) + MARGIN + 1)
     shape = max(bottom - top, 1), max(right - left, 1)
     depth, shade = np.full(shape, np.inf, np.float32), np.zeros(shape, np.float32)
-    _splat(u - left, v - top, xyz[:, 2], grey, depth, shade)
+    _KERNELS.splat(u - left, v - top, xyz[:, 2], grey, depth, shade)
     mask, depth, shade = _closed(depth, shade)
     near = cv2.dilate(mask, np.ones((3, 3), np.uint8), iterations=max(1, round(scale / 2)))
     behind = _background(view, mask, scale, (left, top))
@@ -79,7 +80,7 @@ def _inward(mask: Array) -> Array:
     if not mask.any():
         return np.zeros((*mask.shape, 2), np.int16)
     _, nearest = cv2.distanceTransformWithLabels(1 - mask, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    return np.asarray(_ways(mask, nearest, int(nearest.max()) + 1))
+    return np.asarray(_KERNELS.ways(mask, nearest, int(nearest.max()) + 1))
 
 
 def _scale(xyz: Array, view: View) -> float:
@@ -124,29 +125,3 @@ def _background(view: View, mask: Array, scale: float, corner: tuple[int, int]) 
         lookup[nearest[own == 0]] = seen[own == 0]
         seen = np.where(own > 0, lookup[nearest], seen)
     return np.ascontiguousarray(seen[np.ix_(rows - top, columns - left)], np.float32)
-
-
-@numba.njit(cache=True, nogil=True)
-def _ways(mask, nearest, labels):  # type: ignore[no-untyped-def]
-    """(h, w, 2) int16: from each pixel to the one of the mask that has its label."""
-    lookup, ways = np.zeros((labels, 2), np.int16), np.empty((*mask.shape, 2), np.int16)
-    for row in range(mask.shape[0]):
-        for column in range(mask.shape[1]):
-            if mask[row, column]:
-                at = nearest[row, column]
-                lookup[at, 0], lookup[at, 1] = column, row
-    for row in range(mask.shape[0]):
-        for column in range(mask.shape[1]):
-            at = nearest[row, column]
-            ways[row, column, 0], ways[row, column, 1] = lookup[at, 0] - column, lookup[at, 1] - row
-    return ways
-
-
-@numba.njit(cache=True, nogil=True)
-def _splat(u, v, z, grey, depth, shade):  # type: ignore[no-untyped-def]
-    """Every point claims its pixel where it is the nearest."""
-    for i in range(len(z)):
-        row, column = int(v[i]), int(u[i])
-        if 0 <= row < depth.shape[0] and 0 <= column < depth.shape[1] and z[i] < depth[row, column]:
-            depth[row, column] = z[i]
-            shade[row, column] = grey[i]
