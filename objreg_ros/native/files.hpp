@@ -8,6 +8,9 @@
 #include "objreg_ros/registration/shapes/native/shape.hpp"
 #include "objreg_ros/registration/shapes/native/silhouette.hpp"
 #include "objreg_ros/registration/shapes/native/silhouette_score.hpp"
+#include "objreg_ros/registration/shapes/native/upright_icp.hpp"
+#include "objreg_ros/registration/shapes/native/upright_search.hpp"
+#include "objreg_ros/registration/shapes/native/visual_hull.hpp"
 #include "objreg_ros/segmenter/gravity/native/level_surfaces.hpp"
 #include "objreg_ros/segmenter/objects/native/extract.hpp"
 #include "objreg_ros/segmenter/objects/native/flags.hpp"
@@ -49,6 +52,9 @@ const File FILES[] = {
     {"tracking", tracking::METHODS},
     {"turn", turn::METHODS},
     {"unnamed", unnamed::METHODS},
+    {"upright_icp", upright_icp::METHODS},
+    {"upright_search", upright_search::METHODS},
     {"view", view::METHODS},
+    {"visual_hull", visual_hull::METHODS},
 };
 }  // namespace objreg

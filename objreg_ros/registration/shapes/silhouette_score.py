@@ -12,11 +12,14 @@ import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
+from objreg_ros.native import kernels
 from objreg_ros.registration.kernels.projection import FAST, INDEX, LEAST_DEPTH, project
 from objreg_ros.registration.shapes.shape import Shape
 from objreg_ros.registration.shapes.silhouette import INSIDE, RIM
 from objreg_ros.sensor import NEAR_M
 
+_KERNELS = kernels("silhouette_score")
+ask, climb, tally = _KERNELS.ask, _KERNELS.climb, _KERNELS.tally
 VIOLATION_WEIGHT = 12.0  # of an object's points in seen free space
 OCCLUSION_WEIGHT = 0.6  # of an object's points behind what was seen
 RESIDUAL_WEIGHT = 1.2  # of squared distances from what was seen
@@ -57,14 +60,15 @@ def score_silhouettes(source: Shape, target: Shape, motion: Array, reach: float 
     )
 
 
+# Once more, for the kernels of total_score.py.
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def tolerance_at(z, tolerance):  # type: ignore[no-untyped-def]
+def _tolerance_at(z, tolerance):  # type: ignore[no-untyped-def]
     """How far two depths of one surface may differ at a depth z, m: `Silhouette.tolerance`."""
     return tolerance[0] + tolerance[1] * (z - NEAR_M) * (z - NEAR_M)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def tally(P, N, S, most, T, depth, mask, grey, camera, tolerance, extent, out):  # type: ignore[no-untyped-def]
+def _tally(P, N, S, most, T, depth, mask, grey, camera, tolerance, extent, out):  # type: ignore[no-untyped-def]
     """Add to ``out (10,)`` what a silhouette says of the first ``most`` points under T (3, 4), camera from points."""
     height, width = depth.shape
     us, vs, zs = project(P[:most], T, camera)
@@ -77,7 +81,7 @@ def tally(P, N, S, most, T, depth, mask, grey, camera, tolerance, extent, out): 
         if d <= 0.0:
             continue
         on = mask[row, column]
-        within = tolerance_at(z, tolerance)
+        within = _tolerance_at(z, tolerance)
         e = z - d
         if e < -within:
             if on != RIM:
@@ -108,7 +112,7 @@ def _faces(T, normal, x, y):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def rated(out, n, weights):  # type: ignore[no-untyped-def]
+def _rated(out, n, weights):  # type: ignore[no-untyped-def]
     """The score of a tally of n points; `weights_of` says what the weights are."""
     violated, hidden, residual, grey, expected, noise = weights
     m = max(out[SHADED], 1.0)
@@ -122,7 +126,7 @@ def rated(out, n, weights):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-def]
+def _ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with what both cameras say of a motion (yaw, x, y, rise); returns how many points were asked."""
     P, N, S, Rs, os, depth_s, mask_s, grey_s, camera_s, tolerance_s, _, _ = source
     Q, M, G, Rt, ot, depth_t, mask_t, grey_t, camera_t, tolerance_t, _, _ = target
@@ -134,46 +138,18 @@ def ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-d
         a, b, d = Rt[0, k], Rt[1, k], Rt[2, k]
         T[k, 0], T[k, 1], T[k, 2] = a * c + b * s, b * c - a * s, d
         T[k, 3] = a * (motion[1] + ot[0]) + b * (motion[2] + ot[1]) + d * (motion[3] + ot[2])
-    n = tally(P, N, S, most, T, depth_t, mask_t, grey_t, camera_t, tolerance_t, extent, out)
+    n = _tally(P, N, S, most, T, depth_t, mask_t, grey_t, camera_t, tolerance_t, extent, out)
     # and back: Rs' (turn' (q - shift) + os)
     for k in range(3):
         a, b, d = Rs[0, k], Rs[1, k], Rs[2, k]
         T[k, 0], T[k, 1], T[k, 2] = a * c - b * s, a * s + b * c, d
         T[k, 3] = a * os[0] + b * os[1] + d * (os[2] - motion[3]) - T[k, 0] * motion[1] - T[k, 1] * motion[2]
-    return n + tally(Q, M, G, most, T, depth_s, mask_s, grey_s, camera_s, tolerance_s, extent, out)
+    return n + _tally(Q, M, G, most, T, depth_s, mask_s, grey_s, camera_s, tolerance_s, extent, out)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def two_way(source, target, motion, extent, weights, most):  # type: ignore[no-untyped-def]
     """The score of a motion (yaw, x, y, rise), asked of both cameras."""
     out = np.empty(COUNTS)
-    n = ask(source, target, motion, extent, most, out)
-    return rated(out, n, weights)
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
-def climb(source, target, motion, extent, weights, most, steps, rounds):  # type: ignore[no-untyped-def]
-    """Improve ``motion`` in place by single ``steps (4,)`` that raise the score; they halve where none does.
-
-    Returns the score there.
-    """
-    best = two_way(source, target, motion, extent, weights, most)
-    trial = np.empty(4)
-    size = 1.0
-    for _ in range(rounds):
-        improved = False
-        for k in range(8):
-            step = size * steps[k // 2]
-            if step == 0.0:
-                continue
-            trial[:] = motion
-            trial[k // 2] += step if k % 2 == 0 else -step
-            found = two_way(source, target, trial, extent, weights, most)
-            if found > best + 0.002:
-                best, improved = found, True
-                motion[:] = trial
-        if not improved:
-            size *= 0.5
-            if size < 0.12:
-                break
-    return best
+    n = _ask(source, target, motion, extent, most, out)
+    return _rated(out, n, weights)

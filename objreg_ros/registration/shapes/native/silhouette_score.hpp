@@ -147,7 +147,7 @@ inline double climb(shape::Arrays source, shape::Arrays target, View<double, 1> 
 inline PyMethodDef METHODS[] = {
     binding::method<tally>("tally", "Add to out (10,) what a silhouette says of the first points; how many those are."),
     binding::method<ask>("ask", "Fill out (10,) with what both cameras say of a motion; how many points were asked."),
-    binding::method<climb>("climb", "Improve motion (4,) in place by steps (4,) that raise the score; the score there."),
+    binding::method<climb>("climb", "Improve motion (4,) by steps (4,) that raise the score; the score there."),
     {nullptr, nullptr, 0, nullptr},
 };
 }  // namespace objreg::silhouette_score
