@@ -5,6 +5,8 @@
 #include "objreg_ros/bridge/messages/native/rvl.hpp"
 #include "objreg_ros/keyframes/native/tracking.hpp"
 #include "objreg_ros/keyframes/native/turn.hpp"
+#include "objreg_ros/registration/prepare/native/fpfh.hpp"
+#include "objreg_ros/registration/propose/native/pose_voting.hpp"
 #include "objreg_ros/registration/shapes/native/shape.hpp"
 #include "objreg_ros/registration/shapes/native/silhouette.hpp"
 #include "objreg_ros/registration/shapes/native/silhouette_score.hpp"
@@ -37,10 +39,12 @@ const File FILES[] = {
     {"depth_to_colour", depth_to_colour::METHODS},
     {"extract", extract::METHODS},
     {"flags", flags::METHODS},
+    {"fpfh", fpfh::METHODS},
     {"holes", holes::METHODS},
     {"level", level::METHODS},
     {"level_surfaces", level_surfaces::METHODS},
     {"parts", parts::METHODS},
+    {"pose_voting", pose_voting::METHODS},
     {"registered_depth", registered_depth::METHODS},
     {"rvl", rvl::METHODS},
     {"seams", seams::METHODS},

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.geometry import inverse, pose, rotate, rotation_from_vector, transform
-from objreg_ros.registration.prepare.fpfh import _angle, describe, match, salient
+from objreg_ros.native import kernels
+from objreg_ros.registration.prepare.fpfh import describe, match, salient
 from objreg_ros.registration.prepare.voxels import thin
 from registration.rooms import keyframe, seen_from
 
@@ -76,5 +77,5 @@ def test_points_without_normals_have_no_features() -> None:
 
 def test_an_angle_is_known_far_finer_than_a_bin() -> None:
     true = np.linspace(-np.pi, np.pi, 721)
-    found = [_angle(np.float32(np.sin(angle)), np.float32(np.cos(angle))) for angle in true[1:-1]]
+    found = [kernels("fpfh").angle(np.sin(angle), np.cos(angle)) for angle in true[1:-1]]
     assert np.abs(found - true[1:-1]).max() < 4e-4
