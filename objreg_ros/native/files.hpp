@@ -5,6 +5,8 @@
 #include "objreg_ros/bridge/messages/native/rvl.hpp"
 #include "objreg_ros/keyframes/native/tracking.hpp"
 #include "objreg_ros/keyframes/native/turn.hpp"
+#include "objreg_ros/registration/kernels/native/closest_points.hpp"
+#include "objreg_ros/registration/kernels/native/same_pose.hpp"
 #include "objreg_ros/registration/prepare/native/fpfh.hpp"
 #include "objreg_ros/registration/propose/native/pose_voting.hpp"
 #include "objreg_ros/registration/shapes/native/shape.hpp"
@@ -35,6 +37,7 @@ struct File {
 };
 const File FILES[] = {
     {"cells", cells::METHODS},
+    {"closest_points", closest_points::METHODS},
     {"components", components::METHODS},
     {"depth_to_colour", depth_to_colour::METHODS},
     {"extract", extract::METHODS},
@@ -47,6 +50,7 @@ const File FILES[] = {
     {"pose_voting", pose_voting::METHODS},
     {"registered_depth", registered_depth::METHODS},
     {"rvl", rvl::METHODS},
+    {"same_pose", same_pose::METHODS},
     {"seams", seams::METHODS},
     {"selection", selection::METHODS},
     {"shape", shape::METHODS},

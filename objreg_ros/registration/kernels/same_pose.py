@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
+from objreg_ros.native import kernels
+
+_KERNELS = kernels("same_pose")
 
 
 class Nearness(NamedTuple):
@@ -36,7 +38,8 @@ def distinct(T: Array, scores: Array, middle: Array, limit: int, nearness: Nearn
     """Indices of the best poses (N, 4, 4), at most ``limit``, no two of which are as near at ``middle (3,)``."""
     order = np.argsort(-scores, kind="stable")
     centres = T[:, :3, :3] @ middle + T[:, :3, 3]
-    return [int(k) for k in _distinct(T, centres, order, limit, np.cos(nearness.angle), nearness.distance)]
+    chosen = _KERNELS.distinct(T, centres, order, limit, np.cos(nearness.angle), nearness.distance)
+    return [int(k) for k in chosen]
 
 
 def near(T: Array, T_known: Array, middle: Array, nearness: Nearness) -> Array:
@@ -44,27 +47,3 @@ def near(T: Array, T_known: Array, middle: Array, nearness: Nearness) -> Array:
     cosine = 0.5 * (np.einsum("kij,ij->k", T[:, :3, :3], T_known[:3, :3]) - 1.0)
     moved = np.linalg.norm((T[:, :3, :3] - T_known[:3, :3]) @ middle + T[:, :3, 3] - T_known[:3, 3], axis=-1)
     return np.asarray((cosine > np.cos(nearness.angle)) & (moved < nearness.distance))
-
-
-@numba.njit(cache=True, nogil=True)
-def _distinct(T, centres, order, limit, cosine, distance):  # type: ignore[no-untyped-def]
-    chosen = np.empty(limit, np.int64)
-    n = 0
-    for k in order:
-        if n == limit:
-            break
-        known = False
-        for m in range(n):
-            c = chosen[m]
-            trace, gap = 0.0, 0.0
-            for a in range(3):
-                gap += (centres[c, a] - centres[k, a]) ** 2
-                for b in range(3):
-                    trace += T[c, a, b] * T[k, a, b]
-            if gap < distance * distance and 0.5 * (trace - 1.0) > cosine:
-                known = True
-                break
-        if not known:
-            chosen[n] = k
-            n += 1
-    return chosen[:n]
