@@ -6,9 +6,17 @@
 #include "objreg_ros/keyframes/native/tracking.hpp"
 #include "objreg_ros/keyframes/native/turn.hpp"
 #include "objreg_ros/registration/kernels/native/closest_points.hpp"
+#include "objreg_ros/registration/kernels/native/least_squares.hpp"
+#include "objreg_ros/registration/kernels/native/projection.hpp"
 #include "objreg_ros/registration/kernels/native/same_pose.hpp"
 #include "objreg_ros/registration/prepare/native/fpfh.hpp"
 #include "objreg_ros/registration/propose/native/pose_voting.hpp"
+#include "objreg_ros/registration/refine/native/batch_icp.hpp"
+#include "objreg_ros/registration/refine/native/photometric_icp.hpp"
+#include "objreg_ros/registration/score/native/free_space.hpp"
+#include "objreg_ros/registration/score/native/photometric.hpp"
+#include "objreg_ros/registration/score/native/total_score.hpp"
+#include "objreg_ros/registration/score/native/view_score.hpp"
 #include "objreg_ros/registration/shapes/native/shape.hpp"
 #include "objreg_ros/registration/shapes/native/silhouette.hpp"
 #include "objreg_ros/registration/shapes/native/silhouette_score.hpp"
@@ -36,6 +44,7 @@ struct File {
   PyMethodDef *methods;
 };
 const File FILES[] = {
+    {"batch_icp", batch_icp::METHODS},
     {"cells", cells::METHODS},
     {"closest_points", closest_points::METHODS},
     {"components", components::METHODS},
@@ -43,11 +52,16 @@ const File FILES[] = {
     {"extract", extract::METHODS},
     {"flags", flags::METHODS},
     {"fpfh", fpfh::METHODS},
+    {"free_space", free_space::METHODS},
     {"holes", holes::METHODS},
+    {"least_squares", least_squares::METHODS},
     {"level", level::METHODS},
     {"level_surfaces", level_surfaces::METHODS},
     {"parts", parts::METHODS},
+    {"photometric", photometric::METHODS},
+    {"photometric_icp", photometric_icp::METHODS},
     {"pose_voting", pose_voting::METHODS},
+    {"projection", projection::METHODS},
     {"registered_depth", registered_depth::METHODS},
     {"rvl", rvl::METHODS},
     {"same_pose", same_pose::METHODS},
@@ -57,12 +71,14 @@ const File FILES[] = {
     {"silhouette", silhouette::METHODS},
     {"silhouette_score", silhouette_score::METHODS},
     {"support", support::METHODS},
+    {"total_score", total_score::METHODS},
     {"tracking", tracking::METHODS},
     {"turn", turn::METHODS},
     {"unnamed", unnamed::METHODS},
     {"upright_icp", upright_icp::METHODS},
     {"upright_search", upright_search::METHODS},
     {"view", view::METHODS},
+    {"view_score", view_score::METHODS},
     {"visual_hull", visual_hull::METHODS},
 };
 }  // namespace objreg

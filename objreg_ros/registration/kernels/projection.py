@@ -12,10 +12,16 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from objreg_ros.native import kernels
+
+_KERNELS = kernels("projection")
 LEAST_DEPTH = 0.1  # m: nearer points are taken for points behind the camera
 FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}  # fast arithmetic that still knows NaN: it is in no picture
 INDEX = np.uint32
-ONE = INDEX(1)
+between = _KERNELS.between  # (image, u, v): the bilinear value of an image (h, w) float64, its slopes along u and v
+lands = _KERNELS.lands  # (u, v, z, image): whether a point is before the camera and between four pixels of an image
+nearest = _KERNELS.nearest  # (u, v): the row and the column of the pixel that a place in the image is in
+spread = _KERNELS.spread  # (image, u, v, value): add a value, and its weight of 1, to four pixels of (h, w, 2) float32
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
@@ -43,62 +49,3 @@ def project(points, T, camera):  # type: ignore[no-untyped-def]
         u[i] = fx * u[i] * inverse + cx
         v[i] = fy * v[i] * inverse + cy
     return u, v, z
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def lands(u, v, z, image):  # type: ignore[no-untyped-def]
-    """Whether a point at a depth is before the camera and between four pixels of an ``image (h, w)``."""
-    return (z >= LEAST_DEPTH) & (u >= 0.0) & (v >= 0.0) & (u <= image.shape[1] - 1.001) & (v <= image.shape[0] - 1.001)
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def nearest(u, v):  # type: ignore[no-untyped-def]
-    """The row and the column of the pixel that a place in the image is in."""
-    return INDEX(v + 0.5), INDEX(u + 0.5)
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
-def visible(us, vs, zs, near, far, tolerance, growth):  # type: ignore[no-untyped-def]
-    """Which of the projected points (N,) an image sees: (n,) indices.
-
-    It measured between ``near`` and ``far (h, w)`` there, 0 where it measured nothing, and a depth z agrees within
-    ``tolerance + growth z^2``.
-    """
-    found, n = np.empty(len(us), INDEX), 0
-    for i in range(len(us)):
-        u, v, z = us[i], vs[i], zs[i]
-        if not lands(u, v, z, near):
-            continue
-        row, column = nearest(u, v)
-        low, high = near[row, column], far[row, column]
-        slop = tolerance + growth * z * z
-        found[n] = i
-        n += (high > 0.0) & (z >= low - slop) & (z <= high + slop)
-    return found[:n]
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def between(image, u, v):  # type: ignore[no-untyped-def]
-    """The bilinear value of an ``image (h, w)`` at a place between four pixels, and its slopes along u and v."""
-    left, top = INDEX(u), INDEX(v)
-    a, b = u - left, v - top
-    p, q, r, s = image[top, left], image[top, left + ONE], image[top + ONE, left], image[top + ONE, left + ONE]
-    value = (1.0 - b) * ((1.0 - a) * p + a * q) + b * ((1.0 - a) * r + a * s)
-    return value, (1.0 - b) * (q - p) + b * (s - r), (1.0 - a) * (r - p) + a * (s - q)
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def spread(image, u, v, value):  # type: ignore[no-untyped-def]
-    """Add a value, and its weight of 1, to the four pixels of an ``image (h, w, 2)`` about a place."""
-    left, top = INDEX(u), INDEX(v)
-    a, b = u - left, v - top
-    _drop(image, top, left, (1.0 - b) * (1.0 - a), value)
-    _drop(image, top, left + ONE, (1.0 - b) * a, value)
-    _drop(image, top + ONE, left, b * (1.0 - a), value)
-    _drop(image, top + ONE, left + ONE, b * a, value)
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def _drop(image, row, column, weight, value):  # type: ignore[no-untyped-def]
-    image[row, column, 0] += weight * value
-    image[row, column, 1] += weight

@@ -7,17 +7,18 @@ whole view does not: what one camera saw to be empty, the other must not fill.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverse, inverses
+from objreg_ros.native import kernels
 from objreg_ros.registration.candidate import Verification
 from objreg_ros.registration.prepare.views import Sight
 from objreg_ros.registration.score.free_space import INLIERS, OCCLUDED, SEEN, VIOLATIONS, correlation, count, count_many
 from objreg_ros.registration.score.photometric import NARROW, compare, correlate_views
 from objreg_ros.sensor import depth_tolerance
 
+_KERNELS = kernels("view_score")
 RANKING_POINTS = 500  # a side, of the views, by which hypotheses are ranked
 PHOTOMETRIC_POINTS = 2500  # a side, of the views, that finish a refinement
 LEAST_SCORE = 0.1  # V of a pose that the gate may accept; what is below is not looked at more closely
@@ -25,7 +26,6 @@ LEAST_SCORE = 0.1  # V of a pose that the gate may accept; what is below is not 
 NO_TEXTURE = 0.2  # what stands in for the texture of a view without grey: less than a right pose usually has
 WORST = -3.0  # V where there is nothing to look at
 CERTAINLY = 2.0  # tolerances that leave no doubt
-NEUTRAL = 0.65  # what a wrong pose at its best reaches
 
 
 def verify(source: Sight, target: Sight, T_target_source: Array, sample: int | None = None) -> Verification:
@@ -47,7 +47,7 @@ def verify(source: Sight, target: Sight, T_target_source: Array, sample: int | N
         occluded=float(max(way[OCCLUDED] / way[SEEN] for way in ways)),
         correlation=grey,
         tested=int(ways[0][SEEN] + ways[1][SEEN]),
-        score=float(rated(ways[0], ways[1], NO_TEXTURE if grey is None else grey, _asked(source, target, sample))),
+        score=rated(ways[0], ways[1], NO_TEXTURE if grey is None else grey, _asked(source, target, sample)),
     )
 
 
@@ -55,7 +55,7 @@ def _grey(source: Sight, target: Sight, T: Array, counts: Array | None) -> float
     """How the grey correlates, by ``counts`` where there are some; None for a view without grey."""
     if not (source.textured and target.textured):
         return None
-    return correlate_views(source, target, T) if counts is None else float(correlation(counts))
+    return correlate_views(source, target, T) if counts is None else correlation(counts)
 
 
 def score_views(source: Sight, target: Sight, T_target_source: Array, sample: int) -> Array:
@@ -74,7 +74,7 @@ def count_both_ways(source: Sight, target: Sight, T_target_source: Array, sample
 def score_counts(source: Sight, target: Sight, forward: Array, backward: Array, sample: int) -> Array:
     """V (K,) of what `count_both_ways` counted, with the grey of each image's own band."""
     textured = source.textured and target.textured
-    return np.asarray(_rated_many(forward, backward, textured, _asked(source, target, sample)))
+    return np.asarray(_KERNELS.rated_many(forward, backward, textured, _asked(source, target, sample)))
 
 
 def score_sharply(
@@ -90,7 +90,7 @@ def score_sharply(
     poses near each other, which separate a perturbation from none. Both views must have grey.
     """
     grey = correlation(compare(source, target, T_target_source, NARROW))
-    return float(rated(*ways, grey, _asked(source, target, sample)))
+    return rated(*ways, grey, _asked(source, target, sample))
 
 
 def _asked(source: Sight, target: Sight, sample: int | None) -> int:
@@ -101,7 +101,7 @@ def _asked(source: Sight, target: Sight, sample: int | None) -> int:
 def count_visibility(source: Sight, target: Sight, T_target_source: Array, sample: int | None) -> Array:
     """What the target view says of the source's points; the counts (10,) of `free_space.count`."""
     slops = depth_tolerance(source.noise, target.noise)
-    return np.asarray(count(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops))
+    return count(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops)
 
 
 def certain_violations(source: Sight, target: Sight, T_target_source: Array) -> float:
@@ -126,33 +126,15 @@ def _image(sight: Sight) -> tuple[Array, Array, Array, tuple[float, float, float
     return sight.near, sight.far, sight.detail, sight.camera
 
 
-@numba.njit(cache=True, nogil=True)
-def rated(forward, backward, grey, asked):  # type: ignore[no-untyped-def]
+def rated(forward: Array, backward: Array, grey: float, asked: int) -> float:
     """V of the counts (10,) of both ways, of which ``asked`` points were asked, and of the correlation of ``grey``.
 
     V is made of the worse way's inliers and violations, the texture and the share of all points that could be tested.
     The weights are set by hand, near those of a logistic fit; a view without grey counts as a weak match.
     """
-    seen_a, seen_b = forward[SEEN], backward[SEEN]
-    if min(seen_a, seen_b) < 1.0:
-        return WORST
-    inliers = min(forward[INLIERS] / seen_a, backward[INLIERS] / seen_b)
-    violations = max(forward[VIOLATIONS] / seen_a, backward[VIOLATIONS] / seen_b)
-    share = max((seen_a + seen_b) / asked, 1e-3)
-    return grey + inliers - 3.0 * violations + 0.5 * np.log10(share) - NEUTRAL
+    return float(_KERNELS.rated(forward, backward, grey, asked))
 
 
-@numba.njit(cache=True, nogil=True)
-def rated_quickly(forward, backward, textured, asked):  # type: ignore[no-untyped-def]
+def rated_quickly(forward: Array, backward: Array, textured: bool, asked: int) -> float:
     """V with the grey of each image's own band."""
-    grey = correlation(forward + backward) if textured else NO_TEXTURE
-    return rated(forward, backward, grey, asked)
-
-
-@numba.njit(cache=True, nogil=True)
-def _rated_many(forward, backward, textured, asked):  # type: ignore[no-untyped-def]
-    """V (K,) of many counts (K, 10)."""
-    V = np.empty(len(forward))
-    for k in range(len(V)):
-        V[k] = rated_quickly(forward[k], backward[k], textured, asked)
-    return V
+    return float(_KERNELS.rated_quickly(forward, backward, textured, asked))

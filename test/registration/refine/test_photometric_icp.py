@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
+from objreg_ros.native import kernels
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.kernels.projection import between, project
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.prepare.views import SHADELESS
-from objreg_ros.registration.refine.photometric_icp import _add_grey, finish
+from objreg_ros.registration.refine.photometric_icp import finish
 from registration.rooms import keyframe, seen_from
 
 PARAMS = RegistrarParams()
@@ -62,6 +63,7 @@ def test_a_step_goes_down_the_slope_of_the_weighed_error_of_grey_on_surfaces(bac
 
     H, g = np.zeros((6, 6)), np.zeros(6)
     own = np.ascontiguousarray(inverse(T) if backwards else T)
-    _add_grey((points, shades), own, (near, far, detail, camera), T, backwards, sigma, (1.0, 0.0), H, g)
+    add_grey = kernels("photometric_icp").add_grey
+    add_grey((points, shades), own, (near, far, detail, camera), T, backwards, sigma, (1.0, 0.0), H, g)
     slope = [(cost(1e-6 * axis) - cost(-1e-6 * axis)) / 2e-6 for axis in np.eye(6)]
     assert np.allclose(g, slope, rtol=1e-3, atol=1e-3 * np.abs(g).max())

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.native import kernels
 from objreg_ros.registration.prepare.views import Sight, prepare_sight
 from objreg_ros.registration.score.free_space import SHADED, correlation
-from objreg_ros.registration.score.photometric import NARROW, WINDOW, _mirrored, compare, correlate_views
+from objreg_ros.registration.score.photometric import NARROW, WINDOW, compare, correlate_views
 from objreg_ros.registration.score.view_score import verify
 from registration.rooms import keyframe, seen_from
 
@@ -52,8 +53,9 @@ def test_a_darker_picture_has_the_same_print() -> None:
 
 
 def test_what_is_mirrored_beyond_the_rim_is_of_the_picture_however_small_that_is() -> None:
+    mirrored = kernels("photometric").mirrored
     for size in (1, 4, WINDOW // 2, 160):
-        seen = [_mirrored(place, size) for place in range(-(WINDOW // 2), size + WINDOW // 2)]
+        seen = [mirrored(place, size) for place in range(-(WINDOW // 2), size + WINDOW // 2)]
         assert min(seen) == 0 and max(seen) == size - 1
 
 

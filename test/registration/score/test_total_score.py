@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.native import kernels
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.score import total_score
-from objreg_ros.registration.score.total_score import TotalScore, _poses
+from objreg_ros.registration.score.total_score import TotalScore
 from objreg_ros.registration.score.view_score import score_views
 from objreg_ros.registration.shapes.shape import upright_motion, upright_pose
 from objreg_ros.registration.shapes.silhouette_score import score_silhouettes
@@ -29,7 +30,7 @@ def pair():
 def test_the_kernel_and_the_shapes_mean_the_same_pose(pair) -> None:
     a, b = (each.scene for each in pair)
     motion = np.array([0.4, 0.03, -0.02, 0.01])
-    T, back = _poses(a.kernel_arrays, b.kernel_arrays, motion)
+    T, back = kernels("total_score").poses(a.kernel_arrays, b.kernel_arrays, motion)
     assert np.allclose(T, upright_pose(a, b, motion)) and np.allclose(T @ back, np.eye(4))
 
 

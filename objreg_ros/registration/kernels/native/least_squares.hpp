@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kernels of least_squares.py: normal equations, their sums, their solution, and the step of a pose that it is.
 #pragma once
-#include "objreg_ros/native/array.hpp"
+#include "objreg_ros/native/binding.hpp"
 
 namespace objreg::least_squares {
 // Add to H (6, 6) and g (6,) those of errors (n,) with a weight and a Jacobian (6, n).
@@ -73,4 +73,11 @@ inline void invert(View<const double, 2> T, View<double, 2> back) {
   }
   back(3, 0) = back(3, 1) = back(3, 2) = 0.0, back(3, 3) = 1.0;
 }
+
+inline PyMethodDef METHODS[] = {
+    binding::method<add_normal_equations>("add_normal_equations", "Adds those of weighed errors to H and g."),
+    binding::method<move>("move", "Moves a pose T (4, 4) by a left step (6,) in place; the largest of its parts."),
+    binding::method<solve>("solve", "Turns b (n,) into the x of A x = b; A is spoilt."),
+    {nullptr, nullptr, 0, nullptr},
+};
 }  // namespace objreg::least_squares

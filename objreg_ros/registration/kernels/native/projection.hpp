@@ -2,7 +2,7 @@
 // The kernels of projection.py: where a camera sees points, and what its image holds there. Other kernels begin with
 // them.
 #pragma once
-#include "objreg_ros/native/array.hpp"
+#include "objreg_ros/native/binding.hpp"
 
 namespace objreg::projection {
 constexpr double LEAST_DEPTH = 0.1;  // m: nearer points are taken for points behind the camera
@@ -28,8 +28,8 @@ template <class P> Places moved(View<P, 2> points, View<const double, 2> T) {
 }
 
 // The pixels u, v and the depths z (N,) of `points (N, 3)` moved by `T (4, 4)`; for `lands` to sort out.
-template <class P, class C> Places project(View<P, 2> points, View<const double, 2> T, View<C, 1> camera) {
-  const double fx = camera(0), fy = camera(1), cx = camera(2), cy = camera(3);
+template <class P> Places project(View<P, 2> points, View<const double, 2> T, const std::array<double, 4> &camera) {
+  const auto [fx, fy, cx, cy] = camera;
   Places out = moved(points, T);
   double *__restrict u = out.x.data, *__restrict v = out.y.data, *__restrict z = out.z.data;
   for (i64 i = 0; i < points.size(); i++) {
@@ -39,11 +39,16 @@ template <class P, class C> Places project(View<P, 2> points, View<const double,
   }
   return out;
 }
+template <class P, class C> Places project(View<P, 2> points, View<const double, 2> T, View<C, 1> camera) {
+  return project(points, T, std::array<double, 4>{camera(0), camera(1), camera(2), camera(3)});
+}
 
+// Whether a point at a depth is before the camera and between four pixels of an `image (h, w)`.
 template <class T> bool lands(double u, double v, double z, View<T, 2> image) {
   return (z >= LEAST_DEPTH) & (u >= 0.0) & (v >= 0.0) & (u <= image.shape[1] - 1.001) & (v <= image.shape[0] - 1.001);
 }
 
+// The row and the column of the pixel that a place in the image is in.
 inline Pixel nearest(double u, double v) { return {static_cast<u32>(v + 0.5), static_cast<u32>(u + 0.5)}; }
 
 struct Slopes { double value, u, v; };
@@ -58,11 +63,11 @@ template <class T> Slopes between(View<T, 2> image, double u, double v) {
 }
 
 // Add a value, and its weight of 1, to the four pixels of an `image (h, w, 2)` about a place.
-inline void drop(View<double, 3> image, u32 row, u32 column, double weight, double value) {
+inline void drop(View<float, 3> image, u32 row, u32 column, double weight, double value) {
   image(row, column, 0) += weight * value;
   image(row, column, 1) += weight;
 }
-inline void spread(View<double, 3> image, double u, double v, double value) {
+inline void spread(View<float, 3> image, double u, double v, double value) {
   const u32 left = static_cast<u32>(u), top = static_cast<u32>(v);
   const double a = u - left, b = v - top;
   drop(image, top, left, (1.0 - b) * (1.0 - a), value);
@@ -88,4 +93,30 @@ template <class T> Array<u32, 1> visible(View<const double, 1> us, View<const do
   }
   return std::move(found).first(n);
 }
+
+// The same for Python.
+inline std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 1>> project_points(View<const float, 2> points,
+                                                                                      View<const double, 2> T,
+                                                                                      std::array<double, 4> camera) {
+  Places out = project(points, T, camera);
+  return {std::move(out.x), std::move(out.y), std::move(out.z)};
+}
+inline bool lands_in(double u, double v, double z, View<const double, 2> image) { return lands(u, v, z, image); }
+inline std::tuple<i64, i64> nearest_pixel(double u, double v) {
+  const Pixel at = nearest(u, v);
+  return {at.row, at.column};
+}
+inline std::tuple<double, double, double> between_pixels(View<const double, 2> image, double u, double v) {
+  const Slopes found = between(image, u, v);
+  return {found.value, found.u, found.v};
+}
+
+inline PyMethodDef METHODS[] = {
+    binding::method<between_pixels>("between", "The bilinear value of an image (h, w) at a place, and its slopes."),
+    binding::method<lands_in>("lands", "Whether a point is before the camera and between four pixels of an image."),
+    binding::method<nearest_pixel>("nearest", "The row and the column of the pixel that a place is in."),
+    binding::method<project_points>("project", "The pixels u, v and the depths z (N,) of points moved by T."),
+    binding::method<spread>("spread", "Adds a value, and its weight, to the four pixels of an image about a place."),
+    {nullptr, nullptr, 0, nullptr},
+};
 }  // namespace objreg::projection
