@@ -153,14 +153,6 @@ def turned(image: DepthImage, rotation: Array) -> DepthImage:
     return replace(image, depth=depth)
 
 
-def warm(image: DepthImage) -> None:
-    """Compile or load every kernel: a draughts board of depth replaces the image's."""
-    rows, columns = np.indices(image.depth.shape)
-    board = np.where((rows // 16 + columns // 16) % 2, 1.0, 2.0).astype(np.float32)
-    found = find_rotation(replace(image, depth=board), np.zeros(3), np.full(3, FIRST_SIGMA))
-    turned(image, np.zeros(3) if found is None else found)
-
-
 def _reduced(camera: Intrinsics, every: int) -> tuple[float, float, float, float]:
     return camera.fx / every, camera.fy / every, camera.cx / every, camera.cy / every
 

@@ -21,7 +21,6 @@ Window = tuple[int, int, int, int]  # left, top, right, bottom in cells, half op
 _KERNELS = kernels("cells")
 CELL_ROWS = 240  # about as many rows of cells has a whole image
 MIN_COSINE = np.float32(0.1)  # a surface seen flatter than this is not trusted with a larger area
-EXACT = {"reassoc", "contract", "arcp", "nsz"}  # fast arithmetic that still knows NaN
 
 
 @dataclass(frozen=True, slots=True)

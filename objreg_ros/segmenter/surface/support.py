@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
@@ -107,16 +106,3 @@ def fit_level(
         grid, cells, up, plane.normal, plane.offset, TOLERANCE, MIN_CELLS, stride, lowest
     )
     return Plane(normal, offset, spread) if found else None
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def solve_symmetric(M, v):  # type: ignore[no-untyped-def]
-    """The solution of M x = v, with M symmetric, given as its upper triangle row by row: Cramer's rule."""
-    a, b, c, d, e, f = (np.float64(M[0]), np.float64(M[1]), np.float64(M[2]), np.float64(M[3]), M[4] * 1.0, M[5] * 1.0)
-    p, q, r = d * f - e * e, c * e - b * f, b * e - c * d
-    determinant = a * p + b * q + c * r
-    return (
-        (p * v[0] + q * v[1] + r * v[2]) / determinant,
-        (q * v[0] + (a * f - c * c) * v[1] + (b * c - a * e) * v[2]) / determinant,
-        (r * v[0] + (b * c - a * e) * v[1] + (a * d - b * b) * v[2]) / determinant,
-    )
