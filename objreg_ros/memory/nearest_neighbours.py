@@ -9,23 +9,21 @@ looked at only in tiles that may hold one of the nearest.
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Collection
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.memory.descriptor import EMPHASIS, SIZE
 from objreg_ros.memory.params import MemoryParams
 from objreg_ros.memory.sighting import Sighting
-from objreg_ros.registration.kernels.projection import FAST
+from objreg_ros.native import kernels
 
-LANES = 64
+_KERNELS = kernels("nearest_neighbours")
+LANES = 64  # of the kernels
 NOWHERE = np.float32(np.inf)  # half the squared length of a row that is free
 STEP = np.repeat(np.array([1 / 32, 1 / 64], np.float32), [3, SIZE - 3])  # of the bytes: sizes lie in ±4, shares in ±2
-ROUNDING = 1e-5  # relative: what single precision may lose in a comparison, with a margin
 NO_SESSION = -1  # of what our own tracking says where it is: nothing is left out for it
 
 
@@ -98,11 +96,11 @@ class Block:
         tiles = -(-self._used // LANES)
         descriptor = EMPHASIS * np.asarray(sighting.descriptor, np.float32)
         session = sighting.session if sighting.by_odometry else NO_SESSION
-        found, similarity = _closest(  # type: ignore[call-arg]
+        found, similarity = _KERNELS.closest(
             self._descriptors[:tiles], self._bytes[:tiles], self._half_norms[:tiles], self._spans, self.where,
-            self.when, descriptor, np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
-            round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, sessions.own, sessions.hidden,
-            most, margin,
+            self.when, descriptor, STEP, np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns,
+            session, round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, sessions.own,
+            sessions.hidden, most, margin,
         )  # fmt: skip
         return found, np.maximum(0.5 * float(descriptor @ descriptor) - similarity, 0.0)
 
@@ -113,107 +111,3 @@ class Block:
         self._bytes = np.concatenate([self._bytes, np.zeros_like(self._bytes)])
         self._half_norms = np.concatenate([self._half_norms, np.full_like(self._half_norms, NOWHERE)])
         self._spans = np.concatenate([self._spans, np.zeros_like(self._spans)])
-
-
-@numba.njit(cache=True, nogil=True)
-def _closest(  # type: ignore[no-untyped-def]
-    descriptors, steps, half_norms, spans, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius,
-    drift, own, hidden, most, margin,
-):  # fmt: skip
-    """The rows, the nearest first, and their similarity: half the squared distance below half a length.
-
-    The tiles that promise most come first. What they hold is mostly so alike that few others need be seen.
-    """
-    tops = _promised(steps, half_norms, spans, descriptor)
-    floor = np.partition(tops, len(tops) - most)[len(tops) - most] if len(tops) > most else -NOWHERE
-    seen = (descriptors, half_norms, tops, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius,
-            drift, own, hidden, margin)  # fmt: skip
-    best = [(-NOWHERE, 0, 0) for _ in range(most)]  # as a heap: the least is the first
-    closest = _look(best, -NOWHERE, floor, NOWHERE, *seen)
-    _look(best, closest, -NOWHERE, floor, *seen)
-    best.sort(reverse=True)
-    near = 0
-    while near < most and best[near][0] > max(best[0][0] - margin, -NOWHERE):
-        near += 1
-    return np.array([row for _, _, row in best[:near]], np.int64), np.array([score for score, _, _ in best[:near]])
-
-
-@numba.njit(cache=True, nogil=True)
-def _promised(steps, half_norms, spans, descriptor):  # type: ignore[no-untyped-def]
-    """The most that an object of each tile can be similar, by the bytes."""
-    tops, out = np.empty(len(half_norms), np.float32), np.empty(LANES, np.float32)
-    length, scaled = np.sqrt(np.sum(descriptor * descriptor)), descriptor * STEP
-    for tile in range(len(tops)):
-        off, reach = spans[tile]
-        unsure = length * off + ROUNDING * reach * (reach + length)
-        tops[tile] = _compare_bytes(steps[tile], half_norms[tile], scaled, out) + unsure
-    return tops
-
-
-@numba.njit(cache=True, nogil=True)
-def _look(  # type: ignore[no-untyped-def]
-    best, closest, low, high, descriptors, half_norms, tops, where, when, descriptor, position, way, stamp_ns, session,
-    gap_ns, radius, drift, own, hidden, margin,
-):  # fmt: skip
-    """Put the most similar of the tiles that promise from ``low`` to below ``high`` on the heap ``best``.
-
-    An item is similarity, how old, row; none is -inf. The highest similarity so far goes in and comes back.
-    """
-    similarity = np.empty(LANES, np.float32)
-    for tile in range(len(tops)):
-        least = max(best[0][0], closest - margin, low)
-        if tops[tile] < least or tops[tile] >= high or tops[tile] == -NOWHERE:
-            continue
-        least = max(best[0][0], closest - margin)
-        if _compare(descriptors[tile], half_norms[tile], descriptor, similarity) < least:
-            continue
-        for lane in range(LANES):
-            row, score = tile * LANES + lane, similarity[lane]
-            if score < least or score == -NOWHERE or _holds(hidden, when[row, 1]):
-                continue
-            if abs(when[row, 0] - stamp_ns) < gap_ns and _holds(own, when[row, 1]):
-                continue
-            if when[row, 1] == session and when[row, 3]:
-                reach = radius + drift * abs(way - where[row, 3])
-                x, y, z = where[row, 0] - position[0], where[row, 1] - position[1], where[row, 2] - position[2]
-                if x * x + y * y + z * z > reach * reach:
-                    continue
-            heapq.heappushpop(best, (score, -when[row, 2], row))
-            closest = max(closest, score)
-    return closest
-
-
-@numba.njit(cache=True, nogil=True)
-def _holds(numbers, number):  # type: ignore[no-untyped-def]
-    """Whether a number is among sorted ones."""
-    k = np.searchsorted(numbers, number)
-    return k < len(numbers) and numbers[k] == number
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
-def _compare(descriptors, half_norms, descriptor, out):  # type: ignore[no-untyped-def]
-    """The similarity of every object of a tile, into ``out``; the largest comes back."""
-    for lane in range(LANES):
-        out[lane] = -half_norms[lane]
-    for k in range(len(descriptor)):
-        for lane in range(LANES):
-            out[lane] += descriptor[k] * descriptors[k, lane]
-    largest = out[0]
-    for lane in range(LANES):
-        largest = max(largest, out[lane])
-    return largest
-
-
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
-def _compare_bytes(steps, half_norms, descriptor, out):  # type: ignore[no-untyped-def]
-    """The same by the bytes, three dimensions at once: a third less time. `SIZE` is a multiple of three."""
-    for lane in range(LANES):
-        out[lane] = -half_norms[lane]
-    for k in range(0, SIZE, 3):
-        a, b, c = descriptor[k], descriptor[k + 1], descriptor[k + 2]
-        for lane in range(LANES):
-            out[lane] += a * steps[k, lane] + b * steps[k + 1, lane] + c * steps[k + 2, lane]
-    largest = out[0]
-    for lane in range(LANES):
-        largest = max(largest, out[lane])
-    return largest

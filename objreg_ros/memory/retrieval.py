@@ -17,22 +17,22 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.memory.nearest_neighbours import Block, SessionFilter
 from objreg_ros.memory.params import MemoryParams
 from objreg_ros.memory.sighting import Sighting
+from objreg_ros.native import kernels
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.propose.prior import TIGHT_TRANSLATION_M
 
+_KERNELS = kernels("retrieval")
 VOTE_DISTANCE = 0.5  # distance of descriptors at which a vote falls to 0.6
 VOTE_CUTOFF = 8.0  # half the squared distance behind the nearest beyond which a vote would be nothing
 SHORTLIST = 64  # votes that one object may give
 SPARE = 8  # keyframes that a query names for each one that is tried
 RANKED = 64  # keyframes with the most votes, which take turns
-GAP_SIGMA_M = 0.08  # deviation of the distance of two objects' middles from one view to another
 SAME_PLACE = 8.0  # so much likelier is what the session that goes on saw, or one that is known to show its place
 NEXT_OF_PASS = 0.7  # factor on the votes of a place after each one of its pass that is tried before
 THIS_PASS = 0.9  # and of the very pass that goes on: its motion is known
@@ -105,7 +105,7 @@ class Index:
         where, when, votes = (np.concatenate(column) for column in zip(*ballots, strict=True))
         ballot = np.repeat(np.arange(len(ballots)), [len(ballot[-1]) for ballot in ballots])
         positions = np.array([sighting.position for sighting in sightings], float)
-        first, votes = _tally(when[:, 2], ballot, votes, where[:, :3], positions)
+        first, votes = _KERNELS.tally(when[:, 2], ballot, votes.astype(float), where[:, :3], positions)
         where, when = where[first], when[first]
         votes = votes * self._likelihood(when[:, 1], where[:, 3], sightings[0])
         ranked = np.argsort(-votes, kind="stable")[:RANKED]  # the older first among equals
@@ -137,7 +137,7 @@ class Index:
         )
         same = self._same_pass(session[:, None], travelled[:, None], session, travelled)
         factors = np.where(near, NEIGHBOUR, 1.0) * np.where(same, NEXT_OF_PASS, 1.0)
-        return np.asarray(_in_turn(votes, factors))
+        return np.asarray(_KERNELS.in_turn(votes, factors))
 
     def _same_pass(
         self, session: Array, travelled: Array, other_session: Array | int, other_travelled: Array | float
@@ -146,69 +146,3 @@ class Index:
         params, path = self.params, np.abs(travelled - other_travelled)
         sigma = params.odometry_translation_noise + params.odometry_drift * path
         return np.asarray((session == other_session) & (sigma <= TIGHT_TRANSLATION_M))
-
-
-@numba.njit(cache=True, nogil=True)
-def _gap(xyz, i, j):  # type: ignore[no-untyped-def]
-    x, y, z = xyz[i, 0] - xyz[j, 0], xyz[i, 1] - xyz[j, 1], xyz[i, 2] - xyz[j, 2]
-    return np.sqrt(x * x + y * y + z * z)
-
-
-@numba.njit(cache=True, nogil=True)
-def _tally(keyframe_ids, ballots, votes, xyz, asked_xyz):  # type: ignore[no-untyped-def]
-    """A row of each keyframe, the oldest first, and its votes: of each ballot the first, its nearest object's.
-
-    And those of pairs of objects that are as far from each other as the two that were asked for.
-    """
-    asked_gaps = np.empty((len(asked_xyz), len(asked_xyz)))
-    for i in range(len(asked_xyz)):
-        for j in range(len(asked_xyz)):
-            asked_gaps[i, j] = _gap(asked_xyz, i, j)
-    order = np.argsort(keyframe_ids, kind="mergesort")
-    first, total, found, start = np.empty(len(order), np.int64), np.zeros(len(order)), 0, 0
-    while start < len(order):
-        stop = start + 1
-        while stop < len(order) and keyframe_ids[order[stop]] == keyframe_ids[order[start]]:
-            stop += 1
-        rows = order[start:stop]
-        first[found] = rows[0]
-        for k, row in enumerate(rows):
-            if k == 0 or ballots[row] != ballots[rows[k - 1]]:
-                total[found] += votes[row]
-        total[found] += _arranged(ballots[rows], votes[rows], xyz[rows], asked_gaps)
-        found, start = found + 1, stop
-    return first[:found], total[:found]
-
-
-@numba.njit(cache=True, nogil=True)
-def _arranged(ballots, votes, xyz, asked_gaps):  # type: ignore[no-untyped-def]
-    """The votes of pairs of one keyframe's objects: each object has as much to give as by itself, over all others."""
-    if len(votes) < 2 or ballots[0] == ballots[-1]:
-        return 0.0
-    objects = len(asked_gaps)
-    best = np.zeros((objects, objects))
-    for i in range(len(votes)):
-        for j in range(i):
-            a, b = ballots[j], ballots[i]
-            if a == b:  # two answers to one object
-                continue
-            gap = _gap(xyz, i, j)
-            if gap == 0.0:  # one answer to two
-                continue
-            off = (gap - asked_gaps[a, b]) / GAP_SIGMA_M
-            best[a, b] = max(best[a, b], np.sqrt(votes[i] * votes[j]) * np.exp(-0.5 * off * off))
-    return best.sum() / (objects - 1)
-
-
-@numba.njit(cache=True, nogil=True)
-def _in_turn(votes, factors):  # type: ignore[no-untyped-def]
-    """The order of places: always the one with the most votes; each lowers those of the others by its row."""
-    left, order = votes.copy(), np.empty(len(votes), np.int64)
-    for turn in range(len(votes)):
-        best = np.argmax(left)
-        order[turn] = best
-        left *= factors[best]
-        left[best] = -1.0
-        for k in order[:turn]:
-            left[k] = -1.0
-    return order

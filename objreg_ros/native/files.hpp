@@ -5,6 +5,8 @@
 #include "objreg_ros/bridge/messages/native/rvl.hpp"
 #include "objreg_ros/keyframes/native/tracking.hpp"
 #include "objreg_ros/keyframes/native/turn.hpp"
+#include "objreg_ros/memory/native/nearest_neighbours.hpp"
+#include "objreg_ros/memory/native/retrieval.hpp"
 #include "objreg_ros/registration/kernels/native/closest_points.hpp"
 #include "objreg_ros/registration/kernels/native/least_squares.hpp"
 #include "objreg_ros/registration/kernels/native/projection.hpp"
@@ -57,12 +59,14 @@ const File FILES[] = {
     {"least_squares", least_squares::METHODS},
     {"level", level::METHODS},
     {"level_surfaces", level_surfaces::METHODS},
+    {"nearest_neighbours", nearest_neighbours::METHODS},
     {"parts", parts::METHODS},
     {"photometric", photometric::METHODS},
     {"photometric_icp", photometric_icp::METHODS},
     {"pose_voting", pose_voting::METHODS},
     {"projection", projection::METHODS},
     {"registered_depth", registered_depth::METHODS},
+    {"retrieval", retrieval::METHODS},
     {"rvl", rvl::METHODS},
     {"same_pose", same_pose::METHODS},
     {"seams", seams::METHODS},

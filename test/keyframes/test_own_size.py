@@ -88,16 +88,14 @@ def test_a_keyframe_from_elsewhere_is_cut_to_its_own_size_as_it_is_unpacked() ->
 def test_every_step_of_a_keyframe_has_a_bound_at_the_limits_of_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     """What fusing, describing, retrieving and storing have to do is counted, not timed."""
     pairs: list[int] = []
-    arranged = retrieval._arranged.py_func
+    tally = retrieval._KERNELS.tally
 
-    def counted(ballots: np.ndarray, *others: object) -> float:
-        pairs.append(len(ballots) * (len(ballots) - 1) // 2)
-        return 0.0
+    def counted(keyframe_ids: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        objects = np.unique(keyframe_ids, return_counts=True)[1]
+        pairs.extend((objects * (objects - 1) // 2).tolist())
+        return tuple(tally(keyframe_ids, *others))
 
-    assert callable(arranged)
-    monkeypatch.setattr(retrieval, "_tally", retrieval._tally.py_func)
-    monkeypatch.setattr(retrieval, "_gap", retrieval._gap.py_func)
-    monkeypatch.setattr(retrieval, "_arranged", counted)
+    monkeypatch.setattr(retrieval._KERNELS, "tally", counted)
     registrar = Registrar(RegistrarParams(candidates=1))
     for seconds in (0.0, 10.0, 20.0):
         registrar.track(at_the_limits(seconds))

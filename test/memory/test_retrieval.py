@@ -10,7 +10,7 @@ import pytest
 from registration.samples import box, keyframe, moved
 
 from objreg_ros.data.frames import ObjectCloud
-from objreg_ros.memory.retrieval import Index, _in_turn, _tally
+from objreg_ros.memory.retrieval import _KERNELS, Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -79,14 +79,14 @@ def test_an_object_of_another_size_or_colour_gets_a_lower_vote() -> None:
 def test_an_object_votes_once_for_a_keyframe_by_the_likest_that_it_shows_and_all_votes_add_up() -> None:
     numbers, ballots = np.array([7, 3, 7, 3, 7]), np.array([0, 0, 0, 1, 1])
     alone = np.zeros((5, 3)), np.zeros((2, 3))  # all objects at one point: no pair of them
-    first, votes = _tally(numbers, ballots, np.array([0.9, 0.8, 0.5, 0.4, 0.1]), *alone)
+    first, votes = _KERNELS.tally(numbers, ballots, np.array([0.9, 0.8, 0.5, 0.4, 0.1]), *alone)
     assert first.tolist() == [1, 0] and votes == pytest.approx([1.2, 1.0])
 
 
 @pytest.mark.parametrize(("gap", "more"), [(0.5, 1.0), (0.58, np.exp(-0.5)), (1.5, 0.0)])
 def test_two_objects_as_far_from_each_other_as_those_asked_for_vote_together_too(gap: float, more: float) -> None:
     stored, asked = np.array([[0.0, 0, 0], [0.0, gap, 0]]), np.array([[2.0, 0, 0], [2.5, 0, 0]])
-    _, votes = _tally(np.array([7, 7]), np.array([0, 1]), np.ones(2), stored, asked)
+    _, votes = _KERNELS.tally(np.array([7, 7]), np.array([0, 1]), np.ones(2), stored, asked)
     assert votes == pytest.approx([2.0 + more], abs=1e-6)
 
 
@@ -99,9 +99,9 @@ def test_of_two_places_with_the_same_objects_that_with_their_arrangement_comes_f
 
 def test_the_place_with_the_most_votes_is_next_and_lowers_those_of_its_pass() -> None:
     worth = np.array([[1, 0.5, 1], [0.5, 1, 1], [1, 1, 1]])
-    assert _in_turn(np.array([1.0, 0.9, 0.6]), worth).tolist() == [0, 2, 1]
-    assert _in_turn(np.array([1.0, 0.9, 0.3]), worth).tolist() == [0, 1, 2]
-    assert _in_turn(np.zeros(3), worth).tolist() == [0, 1, 2]
+    assert _KERNELS.in_turn(np.array([1.0, 0.9, 0.6]), worth).tolist() == [0, 2, 1]
+    assert _KERNELS.in_turn(np.array([1.0, 0.9, 0.3]), worth).tolist() == [0, 1, 2]
+    assert _KERNELS.in_turn(np.zeros(3), worth).tolist() == [0, 1, 2]
 
 
 def test_fifty_other_rooms_with_things_as_alike_do_not_crowd_out_the_place_where_odometry_is() -> None:
