@@ -39,6 +39,11 @@
 #include "objreg_ros/segmenter/surface/native/parts.hpp"
 #include "objreg_ros/segmenter/surface/native/seams.hpp"
 #include "objreg_ros/segmenter/surface/native/support.hpp"
+#include "objreg_tools/simulation/rendering/native/raster.hpp"
+#include "objreg_tools/simulation/rendering/native/render.hpp"
+#include "objreg_tools/simulation/rendering/native/shade.hpp"
+#include "objreg_tools/simulation/sensors/native/camera.hpp"
+#include "objreg_tools/simulation/sensors/native/noise.hpp"
 
 namespace objreg {
 struct File {
@@ -47,6 +52,7 @@ struct File {
 };
 const File FILES[] = {
     {"batch_icp", batch_icp::METHODS},
+    {"camera", camera::METHODS},
     {"cells", cells::METHODS},
     {"closest_points", closest_points::METHODS},
     {"components", components::METHODS},
@@ -60,17 +66,21 @@ const File FILES[] = {
     {"level", level::METHODS},
     {"level_surfaces", level_surfaces::METHODS},
     {"nearest_neighbours", nearest_neighbours::METHODS},
+    {"noise", noise::METHODS},
     {"parts", parts::METHODS},
     {"photometric", photometric::METHODS},
     {"photometric_icp", photometric_icp::METHODS},
     {"pose_voting", pose_voting::METHODS},
     {"projection", projection::METHODS},
+    {"raster", raster::METHODS},
     {"registered_depth", registered_depth::METHODS},
+    {"render", render::METHODS},
     {"retrieval", retrieval::METHODS},
     {"rvl", rvl::METHODS},
     {"same_pose", same_pose::METHODS},
     {"seams", seams::METHODS},
     {"selection", selection::METHODS},
+    {"shade", shade::METHODS},
     {"shape", shape::METHODS},
     {"silhouette", silhouette::METHODS},
     {"silhouette_score", silhouette_score::METHODS},

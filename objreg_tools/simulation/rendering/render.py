@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse
+from objreg_ros.native import kernels
 from objreg_tools.simulation.params import ColourParams, DepthParams, DepthSensing, StressParams
 from objreg_tools.simulation.rendering.raster import rasterise
 from objreg_tools.simulation.rendering.view import RenderedView, draw, in_bands
@@ -19,6 +19,7 @@ from objreg_tools.simulation.sensors.depth_sensors import measure, needs_light
 from objreg_tools.simulation.world.model import Symmetry
 from objreg_tools.simulation.world.scene import Placed, Scene
 
+_KERNELS = kernels("render")
 ALONE_PX = 96
 """An object is drawn alone at about this size to see how much of it is hidden."""
 
@@ -107,26 +108,10 @@ def photograph(light: Array | None, colour: ColourParams, stress: StressParams, 
     return rgb
 
 
-@nb.njit(cache=True, nogil=True)
-def _extents(instance, count):  # type: ignore[no-untyped-def]
-    """(count, 5): x0, y0, x1, y1 (outside) and the number of pixels of every instance."""
-    out = np.zeros((count, 5), np.int64)
-    out[:, 0] = out[:, 1] = 2**31
-    for y in range(instance.shape[0]):
-        for x in range(instance.shape[1]):
-            k = instance[y, x]
-            if k == 0:
-                continue
-            out[k, 0], out[k, 1] = min(out[k, 0], x), min(out[k, 1], y)
-            out[k, 2], out[k, 3] = max(out[k, 2], x + 1), max(out[k, 3], y + 1)
-            out[k, 4] += 1
-    return out
-
-
 def see(scene: Scene, instance: Array, T_world_camera: Array, intrinsics: Intrinsics) -> tuple[SeenPixels, ...]:
     """The truth of every object that has a pixel in the mask ``instance (H, W)``."""
     count = max((o.instance for o in scene.objects), default=0) + 1
-    extents = _extents(instance, count)
+    extents = _KERNELS.extents(instance, count)
     visible = [o for o in scene.objects if extents[o.instance, 4] > 0]
     T_camera_world = inverse(T_world_camera)
     return tuple(_seen(scene, o, extents[o.instance], T_world_camera, T_camera_world, intrinsics) for o in visible)

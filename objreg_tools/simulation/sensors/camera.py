@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import cv2
-import numba as nb
 import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.images import Intrinsics
+from objreg_ros.native import kernels
 from objreg_tools.simulation.params import (
     ColourParams,
     DepthParams,
@@ -18,8 +18,8 @@ from objreg_tools.simulation.params import (
     TimeOfFlightParams,
 )
 from objreg_tools.simulation.rendering.shade import LIGHT_SCALE
-from objreg_tools.simulation.sensors.noise import mixed_bits, normal
 
+_KERNELS = kernels("camera")
 KINECT = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
 CAMERAS = {
     "kinect": KINECT,
@@ -38,27 +38,6 @@ LENSES = {
     "webcam": (-0.32, 0.11, 0.0005, -0.0004, 0.0),
 }
 """k1, k2, p1, p2, k3 (plumb_bob) by name: the colour camera of TUM's freiburg1; a wide lens with a strong barrel."""
-
-
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "arcp", "nsz", "reassoc"})
-def _develop(raw, y_first, y_last, gains, shot, read, vignetting, seed, rgb):  # type: ignore[no-untyped-def]
-    """Rows of ``raw`` light (uint16, sqrt-encoded) to sRGB-like uint8 with noise; highlights roll off softly."""
-    height, width = raw.shape[:2]
-    knee, white, one = np.float32(0.8), np.float32(255.0), np.float32(1.0)
-    reach = np.float32(4.0) / np.float32(width * width + height * height)
-    for y in range(y_first, y_last):
-        dy = np.float32(y) - np.float32(0.5) * height
-        for x in range(width):
-            dx = np.float32(x) - np.float32(0.5) * width
-            shade = one - vignetting * (dx * dx + dy * dy) * reach
-            for c in range(3):
-                value = np.float32(raw[y, x, c]) * gains[c] * shade
-                if value > knee:
-                    over = (value - knee) * np.float32(5.0)
-                    value = knee + np.float32(0.2) * over / (one + over)
-                sigma = np.sqrt(read * read + shot * shot * value)
-                value += sigma * normal(mixed_bits(seed, 3 * (y * width + x) + c))
-                rgb[y, x, c] = np.uint8(min(max(value * white + np.float32(0.5), np.float32(0.0)), white))
 
 
 class ColourSensor:
@@ -84,7 +63,7 @@ class ColourSensor:
         """Turn ``rows`` of the exposed image into ``rgb (H, W, 3) uint8``."""
         p = self.params
         numbers = (np.float32(p.shot_noise), np.float32(p.read_noise), np.float32(p.vignetting))
-        _develop(raw, *rows, gains, *numbers, self.seed, rgb)
+        _KERNELS.develop(raw, *rows, gains, *numbers, self.seed, rgb)
 
     def _smeared(self, image: Array) -> Array:
         length = round(self.stress.motion_blur)
