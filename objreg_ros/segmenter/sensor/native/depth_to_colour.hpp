@@ -22,17 +22,18 @@ inline Array<double, 1> given(const Turn &turn) {
 inline i64 steps_along(const float *line, i64 size, i64 stride, View<double, 2> at, i64 n, i64 axis, float base,
                        float growth) {
   i64 last = -1;
+  float before = 0.0f;
   for (i64 k = 0; k < size; k++) {
     const float z = line[k * stride];
     if (z <= 0.0f) continue;
     if (last >= 0 && k - last <= SHADOW) {
-      const float before = line[last * stride], closer = std::min(z, before);
-      if (std::abs(z - before) > static_cast<double>(base + growth * closer * closer) * (k - last)) {
-        at(n, axis) = before < z ? last + 0.5 : k - 0.5;
+      const float off = z - before, closer = std::min(z, before);
+      if (std::abs(off) > static_cast<double>(base + growth * closer * closer) * (k - last)) {
+        at(n, axis) = off > 0.0f ? last + 0.5 : k - 0.5;
         n++;
       }
     }
-    last = k;
+    last = k, before = z;
   }
   return n;
 }
@@ -66,8 +67,8 @@ inline double score_of(View<const double, 2> rays, View<const float, 2> picture,
   double total = 0.0;
   for (i64 k = 0; k < rays.size(); k++) {
     const double x = rays(k, 0), y = rays(k, 1);
-    const double z = 1.0 + a * y - b * x;
-    const double u = fx * (x + b - c * y) / z + cx, v = fy * (y + c * x - a) / z + cy;
+    const double near = 1.0 / (1.0 + a * y - b * x);
+    const double u = fx * (x + b - c * y) * near + cx, v = fy * (y + c * x - a) * near + cy;
     if (!(u >= 0.0 && v >= 0.0 && u < last_column && v < last_row)) continue;
     const i64 left = static_cast<i64>(u), top = static_cast<i64>(v);
     const double p = u - left, q = v - top;
@@ -133,15 +134,27 @@ inline Array<float, 2> turned(View<const float, 2> depth, Camera camera, View<co
   const i64 height = depth.shape[0], width = depth.shape[1];
   const auto [fx, fy, cx, cy] = camera;
   const double a = rotation(0), b = rotation(1), c = rotation(2);
-  auto out = zeros<float, 2>(height, width);
+  Array<float, 2> out(height, width);
+  Array<double, 1> nears(width);
+  Array<i32, 1> rows(width), columns(width);
+  double *__restrict nearness = nears.data;
+  i32 *__restrict from_row = rows.data;
+  i32 *__restrict from_column = columns.data;
   for (i64 row = 0; row < height; row++) {
     const double y = (row - cy) / fy;
-    for (i64 column = 0; column < width; column++) {
+    for (i32 column = 0; column < width; column++) {  // without branches, for the vectors
       const double x = (column - cx) / fx;
       const double away = 1.0 - a * y + b * x;  // the rotation back, of a ray of the colour camera
-      const double u = fx * (x - b + c * y) / away + cx, v = fy * (y - c * x + a) / away + cy;
-      if (!(away > LEAST_AWAY && u > -0.5 && v > -0.5 && u < width - 0.5 && v < height - 0.5)) continue;
-      const double z = depth(static_cast<i64>(v + 0.5), static_cast<i64>(u + 0.5)) / away;
+      const double near = 1.0 / away;
+      const double u = fx * (x - b + c * y) * near + cx, v = fy * (y - c * x + a) * near + cy;
+      const bool seen =
+          (away > LEAST_AWAY) & (u > -0.5) & (v > -0.5) & (u < width - 0.5) & (v < height - 0.5);
+      nearness[column] = seen ? near : 0.0;
+      from_row[column] = static_cast<i32>(seen ? v + 0.5 : 0.0);
+      from_column[column] = static_cast<i32>(seen ? u + 0.5 : 0.0);
+    }
+    for (i64 column = 0; column < width; column++) {
+      const double z = depth(rows(column), columns(column)) * nears(column);
       out(row, column) = z <= most ? static_cast<float>(z) : 0.0f;
     }
   }
