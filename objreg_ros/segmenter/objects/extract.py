@@ -60,6 +60,5 @@ def cell_points(surface: Surface, cells: Array, rgb: Array) -> tuple[Array, Arra
 
     ``rgb (H, W, 3) uint8`` is the whole picture; without colour its height is 0 and so is N of the colours.
     """
-    s = surface
-    found: tuple[Array, Array, Array] = _KERNELS.gather_cells(s.depth, s.normals, s.x, s.y, s.step, rgb, cells)
-    return found
+    depth, step = surface.depth, surface.step
+    return tuple(_KERNELS.gather_cells(depth, surface.normals, surface.x, surface.y, step, rgb, cells))

@@ -112,7 +112,8 @@ inline i64 mark(View<const float, 2> depth, std::array<i64, 4> box, const Grid &
     if (!some) continue;
     const auto row = depth.row(v).cut(x0, x1);
     const auto marks = mask.row(v - y0 + 1).cut(1, n + 1);
-    auto [found, doubtful] = mark_own(n, row.data, cell.data, own.data, possible.data, jump, marks.data, open_ends.data);
+    auto [found, doubtful] =
+        mark_own(n, row.data, cell.data, own.data, possible.data, jump, marks.data, open_ends.data);
     for (i64 u = 0; doubtful > 0 && u < n; u++)
       if (open_ends(u)) {
         marks(u) = nearest(grid, i, cols(u), row(u), largest_step(jump, row(u)));
@@ -189,6 +190,13 @@ inline float fill(View<const float, 1> x, float y, View<const float, 1> z, View<
   return area;
 }
 
+inline void copy(View<const u8, 2> pixels, View<u8, 2> out) {
+  if (pixels.stride[0] == 3) std::copy_n(pixels.data, 3 * pixels.size(), out.cut(0, pixels.size()).data);
+  else
+    for (i64 k = 0; k < pixels.size(); k++)
+      for (int c = 0; c < 3; c++) out(k, c) = pixels(k, c);
+}
+
 using Around = std::tuple<i64, i64, i64, i64>;
 using Points = std::tuple<Array<float, 2>, Array<float, 2>, Array<u8, 2>>;
 
@@ -231,14 +239,13 @@ inline std::tuple<Array<float, 2>, Array<float, 2>, Array<u8, 2>, Array<u16, 1>,
       const auto z = depth.row(v).cut(x0 + left, x0 + last);
       area += fill(x.from(left), y, z, cell_normals, cols.from(left), min_cosine, xyz.from(n), normals.from(n));
       std::copy_n(flags.cut(left, last).data, size, edge.cut(n, n + size).data);
-      if (rgb.size() > 0)
-        std::copy_n(rgb.row(v).cut(x0 + left, x0 + last).data, 3 * size, colour.cut(n, n + size).data);
+      if (rgb.size() > 0) copy(rgb.row(v).cut(x0 + left, x0 + last), colour.from(n));
       n += size, left = last;
       while (left < right && !kept(left)) left++;
     }
   }
   const i64 coloured = rgb.size() > 0 ? n : 0;
-  return {std::move(xyz).first(n),   std::move(normals).first(n), std::move(colour).first(coloured),
+  return {std::move(xyz).first(n), std::move(normals).first(n), std::move(colour).first(coloured),
           std::move(edge).first(n), area, Around{around[0], around[1], around[2], around[3]}};
 }
 
