@@ -19,7 +19,7 @@ from objreg_ros.registration.shapes.silhouette_score import (
     tally,
     weights_of,
 )
-from objreg_ros.sensor import silhouette_tolerance
+from objreg_ros.sensor import NEAR_M, silhouette_tolerance
 from registration.drawn_shapes import BOX, ELL, from_side
 from registration.shapes.test_upright_search import shape_of
 
@@ -96,3 +96,19 @@ def test_a_point_is_on_the_surface_floats_or_is_hidden_the_more_the_deeper_it_li
     tally(point, normal, grey[0, :1], 1, np.eye(4)[:3], depth, mask, grey, camera, tolerance, 0.2, out)
     assert out[what] == pytest.approx(counted, abs=1e-5)
     assert out[[INLIERS, VIOLATIONS, HIDDEN]].sum() == pytest.approx(counted, abs=1e-5)
+
+
+@pytest.mark.parametrize("depth", [0.3, NEAR_M, 1.0, 3.0])
+def test_how_far_a_point_may_be_off_grows_from_the_depth_where_noise_is_least(depth: float) -> None:
+    tolerance = silhouette_tolerance(1.0)
+    within = tolerance[0] + tolerance[1] * (depth - NEAR_M) ** 2
+    image, mask, camera = (
+        np.zeros((3, 3), np.float32),
+        np.full((3, 3), INSIDE, np.uint8),
+        np.array([1.0, 1.0, 1.5, 1.5]),
+    )
+    point, normal = np.array([[0.0, 0.0, depth]], np.float32), np.array([[0.0, 0.0, -1.0]], np.float32)
+    for share, what in ((0.99, INLIERS), (1.01, HIDDEN), (-0.99, INLIERS), (-1.01, VIOLATIONS)):
+        behind, out = np.full((3, 3), depth - share * within, np.float32), np.zeros(COUNTS)
+        tally(point, normal, image[0, :1], 1, np.eye(4)[:3], behind, mask, image, camera, tolerance, 1e-3, out)
+        assert out[what] > 0.0 and out[[INLIERS, VIOLATIONS, HIDDEN]].sum() == out[what]

@@ -19,13 +19,18 @@ using Arrays = std::tuple<View<const float, 2>, View<const float, 2>, View<const
 inline Array<float, 2> level(View<const float, 2> xyz, View<const float, 2> normals, View<const float, 2> R,
                              View<const float, 2> within, View<const float, 2> beyond, double low, double high) {
   Array<float, 2> found(xyz.size(), 3);
+  const float xx = R(0, 0), xy = R(0, 1), xz = R(0, 2), yx = R(1, 0), yy = R(1, 1), yz = R(1, 2);
+  const float zx = R(2, 0), zy = R(2, 1), zz = R(2, 2);
+  const float west = within(0, 0), south = within(0, 1), east = within(1, 0), north = within(1, 1);
+  const float left = beyond(0, 0), front = beyond(0, 1), right = beyond(1, 0), back = beyond(1, 1);
   i64 n = 0;
   for (i64 i = 0; i < xyz.size(); i++) {
-    if (R(2, 0) * normals(i, 0) + R(2, 1) * normals(i, 1) + R(2, 2) * normals(i, 2) <= LEVEL) continue;
-    for (int k = 0; k < 3; k++) found(n, k) = R(k, 0) * xyz(i, 0) + R(k, 1) * xyz(i, 1) + R(k, 2) * xyz(i, 2);
-    const float x = found(n, 0), y = found(n, 1), z = found(n, 2);
-    const bool inside = (x > within(0, 0)) & (y > within(0, 1)) & (x < within(1, 0)) & (y < within(1, 1));
-    const bool outside = (x < beyond(0, 0)) | (y < beyond(0, 1)) | (x > beyond(1, 0)) | (y > beyond(1, 1));
+    if (zx * normals(i, 0) + zy * normals(i, 1) + zz * normals(i, 2) <= LEVEL) continue;
+    const float a = xyz(i, 0), b = xyz(i, 1), c = xyz(i, 2);
+    const float x = xx * a + xy * b + xz * c, y = yx * a + yy * b + yz * c, z = zx * a + zy * b + zz * c;
+    const bool inside = (x > west) & (y > south) & (x < east) & (y < north);
+    const bool outside = (x < left) | (y < front) | (x > right) | (y > back);
+    found(n, 0) = x, found(n, 1) = y, found(n, 2) = z;
     n += inside & outside & (z > low) & (z < high);
   }
   return std::move(found).first(n);
