@@ -6,6 +6,7 @@
 
 namespace objreg::projection {
 constexpr double LEAST_DEPTH = 0.1;  // m: nearer points are taken for points behind the camera
+constexpr i64 BLOCK = 256;           // points that `landing` looks at together
 
 struct Places { Array<double, 1> x, y, z; };
 struct Pixel { u32 row, column; };
@@ -16,14 +17,20 @@ template <class P> Places moved(View<P, 2> points, View<const double, 2> T) {
   const double yx = T(1, 0), yy = T(1, 1), yz = T(1, 2), y0 = T(1, 3);
   const double zx = T(2, 0), zy = T(2, 1), zz = T(2, 2), z0 = T(2, 3);
   const i64 n = points.size();
+  check(2, points.shape[1]);
   Places out{Array<double, 1>(n), Array<double, 1>(n), Array<double, 1>(n)};
   double *__restrict x = out.x.data, *__restrict y = out.y.data, *__restrict z = out.z.data;
-  for (i64 i = 0; i < n; i++) {
-    const double a = points(i, 0), b = points(i, 1), c = points(i, 2);
-    x[i] = xx * a + xy * b + xz * c + x0;
-    y[i] = yx * a + yy * b + yz * c + y0;
-    z[i] = zx * a + zy * b + zz * c + z0;
-  }
+  const P *__restrict p = points.data;
+  const auto move = [&](auto stride) {
+    for (i64 i = 0; i < n; i++) {
+      const double a = p[i * stride], b = p[i * stride + 1], c = p[i * stride + 2];
+      x[i] = xx * a + xy * b + xz * c + x0;
+      y[i] = yx * a + yy * b + yz * c + y0;
+      z[i] = zx * a + zy * b + zz * c + z0;
+    }
+  };
+  if (points.stride[0] == 3) move(std::integral_constant<i64, 3>());  // several points at a time
+  else move(points.stride[0]);
   return out;
 }
 
@@ -76,19 +83,38 @@ inline void spread(View<float, 3> image, double u, double v, double value) {
   drop(image, top + 1, left + 1, b * a, value);
 }
 
+// Which of the projected points (N,) land in an image: (n,) indices. Without a jump, which the processor would guess
+// wrong; what follows reads pixels of these alone.
+template <class T>
+Array<u32, 1> landing(View<const double, 1> us, View<const double, 1> vs, View<const double, 1> zs, View<T, 2> image) {
+  Array<u32, 1> found(us.size());
+  const double right = image.shape[1] - 1.001, bottom = image.shape[0] - 1.001;
+  const double *__restrict u = us.data, *__restrict v = vs.data, *__restrict z = zs.data;
+  u32 *__restrict out = found.data;
+  i64 n = 0, lands[BLOCK];
+  for (i64 first = 0; first < us.size(); first += BLOCK) {
+    const i64 count = std::min(BLOCK, us.size() - first);
+    for (i64 k = 0; k < count; k++) {  // several points at a time
+      const double x = u[first + k], y = v[first + k];
+      lands[k] = (z[first + k] >= LEAST_DEPTH) & (x >= 0.0) & (y >= 0.0) & (x <= right) & (y <= bottom);
+    }
+    for (i64 k = 0; k < count; k++) out[n] = static_cast<u32>(first + k), n += lands[k];
+  }
+  return std::move(found).first(n);
+}
+
 // Which of the projected points (N,) an image sees: (n,) indices. It measured between `near` and `far (h, w)` there, 0
 // where it measured nothing, and a depth z agrees within tolerance + growth z^2.
 template <class T> Array<u32, 1> visible(View<const double, 1> us, View<const double, 1> vs, View<const double, 1> zs,
                                          View<T, 2> near, View<T, 2> far, double tolerance, double growth) {
-  Array<u32, 1> found(us.size() + 1);
+  Array<u32, 1> found = landing(us, vs, zs, near);
   i64 n = 0;
-  for (i64 i = 0; i < us.size(); i++) {
-    const double u = us(i), v = vs(i), z = zs(i);
-    if (!lands(u, v, z, near)) continue;
-    const Pixel at = nearest(u, v);
+  for (i64 k = 0; k < found.size(); k++) {
+    const u32 i = found(k);
+    const double z = zs(i), slop = tolerance + growth * z * z;
+    const Pixel at = nearest(us(i), vs(i));
     const double low = near(at.row, at.column), high = far(at.row, at.column);
-    const double slop = tolerance + growth * z * z;
-    found(n) = static_cast<u32>(i);
+    found(n) = i;
     n += (high > 0.0) & (z >= low - slop) & (z <= high + slop);
   }
   return std::move(found).first(n);

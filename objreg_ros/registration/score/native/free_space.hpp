@@ -23,15 +23,15 @@ inline Counts counts_of(View<const double, 1> given) {
 inline Counts counted(View<const float, 2> points, View<const float, 1> shades, View<const double, 2> T,
                       View<const float, 2> near, View<const float, 2> far, View<const float, 2> detail,
                       const Camera &camera, double tolerance, double growth) {
-  i64 inliers = 0, violations = 0, occluded = 0, shaded = 0;
+  i64 inliers = 0, violations = 0, occluded = 0, n = 0;
   double a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
   const projection::Places at = projection::project(points, T, camera);
-  for (i64 i = 0; i < points.size(); i++) {
-    const double u = at.x(i), v = at.y(i), z = at.z(i);
-    if (!projection::lands(u, v, z, near)) continue;
-    const projection::Pixel pixel = projection::nearest(u, v);
+  Array<u32, 1> found = projection::landing(at.x, at.y, at.z, near);
+  for (i64 k = 0; k < found.size(); k++) {
+    const u32 i = found(k);
+    const double z = at.z(i), slop = tolerance + growth * z * z;
+    const projection::Pixel pixel = projection::nearest(at.x(i), at.y(i));
     const float low = near(pixel.row, pixel.column), high = far(pixel.row, pixel.column);
-    const double slop = tolerance + growth * z * z;
     const bool measured = high > 0.0f;
     const bool before = measured & (z < low - slop), behind = measured & (z > high + slop);
     const bool between_sides = (z > low + slop) & (z < high - slop);  // of an edge: says nothing
@@ -39,16 +39,19 @@ inline Counts counted(View<const float, 2> points, View<const float, 1> shades, 
     violations += before;
     occluded += behind;
     inliers += on;
+    found(n) = i;
+    n += on & (shades(i) < SHADELESS) & (high - low <= 2.0 * slop);  // silhouettes look alike everywhere
+  }
+  for (i64 k = 0; k < n; k++) {
+    const u32 i = found(k);
     const float own = shades(i);
-    if (!(on & (own < SHADELESS) & (high - low <= 2.0 * slop))) continue;  // silhouettes look alike everywhere
-    const double shade = projection::between(detail, u, v).value;
-    shaded++;
+    const double shade = projection::between(detail, at.x(i), at.y(i)).value;
     a += own, b += shade;
     aa += own * own, bb += shade * shade, ab += own * shade;
   }
   const auto number = [](i64 n) { return static_cast<double>(n); };
   return {number(inliers + violations + occluded), number(inliers), number(violations), number(occluded),
-          number(shaded), a, b, aa, bb, ab};
+          number(n), a, b, aa, bb, ab};
 }
 
 // The same for many poses (K, 4, 4): (K, 10).

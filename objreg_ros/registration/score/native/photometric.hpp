@@ -10,8 +10,8 @@ constexpr int LAYERS = 5;         // that are summed in a window: where there is
 
 struct Greys { Array<float, 2> both, theirs, ours; };
 
-// The grey of `points` moved by `T` where an image agrees with their depth, spread over four pixels each: (h, w, 2), the
-// sums of grey and of weights.
+// The grey of `points` moved by `T` where an image agrees with their depth, spread over four pixels each: (h, w, 2),
+// the sums of grey and of weights.
 inline Array<float, 3> laid(View<const float, 2> points, View<const float, 1> greys, View<const double, 2> T,
                             View<const float, 2> near, View<const float, 2> far, free_space::Camera camera,
                             std::array<double, 2> slops) {
