@@ -30,15 +30,26 @@ struct Sums { i64 count; double weight, squared, spread; };
 // Which of the places (N,) have a closest point in their cell of the grid, and which that is: (n,) indices each.
 inline Partners partners(View<const double, 1> x, View<const double, 1> y, View<const double, 1> z, const Surface &to) {
   Array<u32, 1> met(x.size()), partner(x.size());
-  const i64 rows = to.closest.shape[0], columns = to.closest.shape[1], layers = to.closest.shape[2];
+  const double rows = to.closest.shape[0], columns = to.closest.shape[1], layers = to.closest.shape[2];
   const double x0 = to.low(0), y0 = to.low(1), z0 = to.low(2), scale = 1.0 / to.cell;
-  i64 n = 0;
-  for (i64 i = 0; i < x.size(); i++) {
-    const double a = (x(i) - x0) * scale, b = (y(i) - y0) * scale, c = (z(i) - z0) * scale;
-    if (!((a >= 0.0) & (b >= 0.0) & (c >= 0.0) & (a < rows) & (b < columns) & (c < layers))) continue;
-    const i32 j = to.closest(static_cast<u32>(a), static_cast<u32>(b), static_cast<u32>(c));
-    met(n) = static_cast<u32>(i), partner(n) = static_cast<u32>(std::max(j, 0));
-    n += j >= 0;
+  constexpr i64 BLOCK = projection::BLOCK;
+  i32 as[BLOCK], bs[BLOCK], cs[BLOCK];
+  i64 inside[BLOCK], n = 0;
+  for (i64 first = 0; first < x.size(); first += BLOCK) {
+    const i64 size = std::min(BLOCK, x.size() - first);
+    const double *__restrict xs = x.data + first, *__restrict ys = y.data + first, *__restrict zs = z.data + first;
+    for (i64 k = 0; k < size; k++) {  // several points at a time
+      const double a = (xs[k] - x0) * scale, b = (ys[k] - y0) * scale, c = (zs[k] - z0) * scale;
+      const bool in = (a >= 0.0) & (b >= 0.0) & (c >= 0.0) & (a < rows) & (b < columns) & (c < layers);
+      inside[k] = in;
+      as[k] = static_cast<i32>(in ? a : 0.0), bs[k] = static_cast<i32>(in ? b : 0.0);
+      cs[k] = static_cast<i32>(in ? c : 0.0);
+    }
+    for (i64 k = 0; k < size; k++) {
+      const i32 j = to.closest(as[k], bs[k], cs[k]);  // of the first cell, for a place that is in none
+      met(n) = static_cast<u32>(first + k), partner(n) = static_cast<u32>(std::max(j, 0));
+      n += inside[k] & (j >= 0);
+    }
   }
   return {std::move(met).first(n), std::move(partner).first(n)};
 }

@@ -26,21 +26,39 @@ inline Counts counted(View<const float, 2> points, View<const float, 1> shades, 
   i64 inliers = 0, violations = 0, occluded = 0, n = 0;
   double a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
   const projection::Places at = projection::project(points, T, camera);
-  Array<u32, 1> found = projection::landing(at.x, at.y, at.z, near);
-  for (i64 k = 0; k < found.size(); k++) {
-    const u32 i = found(k);
-    const double z = at.z(i), slop = tolerance + growth * z * z;
-    const projection::Pixel pixel = projection::nearest(at.x(i), at.y(i));
-    const float low = near(pixel.row, pixel.column), high = far(pixel.row, pixel.column);
-    const bool measured = high > 0.0f;
-    const bool before = measured & (z < low - slop), behind = measured & (z > high + slop);
-    const bool between_sides = (z > low + slop) & (z < high - slop);  // of an edge: says nothing
-    const bool on = measured & !(before | behind | between_sides);
-    violations += before;
-    occluded += behind;
-    inliers += on;
-    found(n) = i;
-    n += on & (shades(i) < SHADELESS) & (high - low <= 2.0 * slop);  // silhouettes look alike everywhere
+  Array<u32, 1> found(points.size());
+  constexpr i64 BLOCK = projection::BLOCK;
+  const double right = near.shape[1] - 1.001, bottom = near.shape[0] - 1.001;
+  i32 rows[BLOCK], columns[BLOCK];
+  i64 lands[BLOCK], compared[BLOCK];
+  float lows[BLOCK], highs[BLOCK];
+  const i64 most = near.shape[0] * near.shape[1] > 0 ? points.size() : 0;
+  check_slice(0, points.size(), shades.size());
+  for (i64 first = 0; first < most; first += BLOCK) {  // each step for several points at a time
+    const i64 size = std::min(BLOCK, most - first);
+    const double *__restrict us = at.x.data + first, *__restrict vs = at.y.data + first;
+    const double *__restrict zs = at.z.data + first;
+    const float *__restrict own = shades.data + first;
+    for (i64 k = 0; k < size; k++) {
+      const double u = us[k], v = vs[k];
+      const bool in = (zs[k] >= projection::LEAST_DEPTH) & (u >= 0.0) & (v >= 0.0) & (u <= right) & (v <= bottom);
+      lands[k] = in;
+      rows[k] = static_cast<i32>(in ? v + 0.5 : 0.0), columns[k] = static_cast<i32>(in ? u + 0.5 : 0.0);
+    }
+    for (i64 k = 0; k < size; k++) lows[k] = near(rows[k], columns[k]), highs[k] = far(rows[k], columns[k]);
+    for (i64 k = 0; k < size; k++) {
+      const double z = zs[k], slop = tolerance + growth * z * z;
+      const float low = lows[k], high = highs[k];
+      const bool measured = (lands[k] != 0) & (high > 0.0f);
+      const bool before = measured & (z < low - slop), behind = measured & (z > high + slop);
+      const bool between_sides = (z > low + slop) & (z < high - slop);  // of an edge: says nothing
+      const bool on = measured & !(before | behind | between_sides);
+      violations += before;
+      occluded += behind;
+      inliers += on;
+      compared[k] = on & (own[k] < SHADELESS) & (high - low <= 2.0 * slop);  // silhouettes look alike everywhere
+    }
+    for (i64 k = 0; k < size; k++) found(n) = static_cast<u32>(first + k), n += compared[k];
   }
   for (i64 k = 0; k < n; k++) {
     const u32 i = found(k);
