@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-HEAVY = ("distributed", "gtsam", "matplotlib", "open3d", "plotly", "pyarrow", "rerun")
+HEAVY = ("distributed", "gtsam", "matplotlib", "numba", "open3d", "plotly", "pyarrow", "rerun")
 EXTRAS = ("click", "gtsam", "jinja2", "matplotlib", "open3d", "plotly", "rosbags", "tqdm")
 NODES = (*(f"objreg_ros.{stage}" for stage in ("detector", "segmenter", "registrar", "keyframes")), "objreg_mapper")
 CODE = "import importlib, sys; importlib.import_module(sys.argv[1]); print(*(set(sys.argv[2:]) & set(sys.modules)))"

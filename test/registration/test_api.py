@@ -33,5 +33,5 @@ def test_our_methods_have_the_verbs_of_a_method(method: type, verb: str) -> None
 
 
 def test_the_protocols_load_no_kernel() -> None:
-    code = "import sys, objreg_ros.registration.api; sys.exit('numba' in sys.modules)"
+    code = "import sys, objreg_ros.registration.api; sys.exit('objreg_ros.native' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
