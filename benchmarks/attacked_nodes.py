@@ -30,7 +30,7 @@ SHARES = {"detector": 1.0, "segmenter": 1.0, "registrar": 1.0, "mapper": 0.7, "k
 BATCH = 40
 THROUGH_S = 30.0  # within which a good frame comes through again, on a machine that is busy
 PACE_S = 0.01
-START_S = 600.0  # a first start compiles kernels
+START_S = 120.0
 STEP_NS = good.SECOND // 10
 GOOD = 0.3  # of the frames in a batch
 

@@ -20,7 +20,7 @@ CHANGES = {
 }  # fmt: skip
 """Which arguments of an event are paths that it changes, and which the folder that each is relative to."""
 FREE = ("/dev/", "/proc/")
-COMPILED = "__pycache__"  # kernels are compiled when they are met first
+COMPILED = "__pycache__"  # Python keeps what it compiled of a module
 
 
 class Fence:

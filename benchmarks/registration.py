@@ -16,8 +16,7 @@ Beside ours, in the same run: the usual ways to register two object clouds, on t
 
 `--cache` keeps every finished piece, so that a run that was stopped goes on where it was, if the code is the same. Each
 condition has a process of its own; `--processes 1` runs them one after the other, for times that nothing disturbs.
-`--quick` is small pieces of the same in a fixed order, as many as fit into its time beside compiling every kernel,
-should none be compiled yet.
+`--quick` is small pieces of the same in a fixed order, as many as fit into its time.
 """
 
 from __future__ import annotations
@@ -39,11 +38,10 @@ from closure import code
 from cloud_peers import Peer, cloud_peers
 from command_line import given
 from looks import Setting, Shot, Shots, around, four, strangers
-from paper import TABLE_1, Stage, keyframe
+from paper import TABLE_1, Stage
 from pose_figures import SUCCESS, error_at, grouped, judged, mean, median, nees, percentiles
 from sources import SIMULATED
 
-from objreg_ros.data.images import DepthImage, Detections
 from objreg_ros.geometry import inverse, pose_error, transform
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate
@@ -52,12 +50,7 @@ from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.propose.hypotheses import Hypothesis
 from objreg_ros.registration.propose.object_poses import from_shapes
-from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.segment import Segmenter
-from objreg_tools.simulation.drawn_place import drawn
 from objreg_tools.simulation.params import StressParams
-from objreg_tools.simulation.rendering.render import render
-from objreg_tools.simulation.sensors.camera import KINECT
 from objreg_tools.truth import FALSE, within
 
 CONDITIONS = {
@@ -283,31 +276,9 @@ def peer_success(peer: Peer, stage: Stage, first: Shot, second: Shot) -> bool:
     return within(stage.error(T, first.T_world_camera, second.T_world_camera), SUCCESS)
 
 
-def compile_kernels() -> None:
-    """Whatever the pieces run, once and thrown away, so that no pair is timed with its compilation."""
+def load_all() -> None:
+    """Whatever the pieces run, once and thrown away, so that no pair is timed with what is imported."""
     Bench("clean", 0).together(99, [20.0])
-
-
-def compile_half(half: int) -> None:
-    """One half of the kernels, by what they need least of each other: those of the segmenter, or all others.
-
-    They are kept on disk, so that who compiles one half finds the other there.
-    """
-    if half == 0:
-        v, u = np.mgrid[:480, :640]
-        away = np.where((abs(u - 320) < 60) & (abs(v - 240) < 60), 0.9, 0.5 + 240.0 / (v + 120.0)).astype(np.float32)
-        rgb = ((u + 7 * v)[..., None] * np.array([1, 3, 5]) % 251).astype(np.uint8)
-        depth = DepthImage(depth=away, rgb=rgb, intrinsics=KINECT, stamp_ns=0)
-        boxes = Detections(
-            xyxy=np.array([[240, 160, 400, 320]], np.float32),
-            score=np.ones(1, np.float32), label=("book",), image_hw=away.shape, stamp_ns=0,
-        )  # fmt: skip
-        Segmenter(SegmenterParams()).segment(boxes, depth)
-    else:
-        stage = Stage.of("soda_can", 99, ASIDE)
-        render(stage.scene, stage.camera((0.0, 0.0, 0.0), np.random.default_rng(0)), seed=0)
-        params = RegistrarParams().replaced(**SIMULATED)
-        Engine(params).propose(keyframe(drawn(0), params), keyframe(drawn(1), params))
 
 
 Piece = tuple[str, Callable[[Bench], None]]
@@ -348,7 +319,7 @@ def run(
     No piece beyond the least begins after the moment ``stop``.
     """
     bench = Bench(condition, seed, cache)
-    compile_kernels()
+    load_all()
     for k, (name, piece) in enumerate(whole(*size) if size else glimpses()):
         if k >= LEAST and time.time() > stop:
             break
@@ -387,7 +358,6 @@ def main(
     stop = start + QUICK_SECONDS if quick else math.inf
     size = None if quick else (reps, negatives, every)
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork")) as pool:
-        list(pool.map(compile_half, range(2)))
         found = pool.map(run, CONDITIONS, *([part] * 2 for part in (seed, cache, size, stop)))
         figures = dict(zip(CONDITIONS, found, strict=True))
     for condition, row in figures.items():

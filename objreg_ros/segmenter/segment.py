@@ -106,7 +106,7 @@ class Segmenter:
 
 
 def _plain(image: DepthImage) -> DepthImage:
-    """``image`` with arrays in the one memory layout that the kernels are compiled for."""
+    """``image`` with its arrays in C order, so that no kernel copies them."""
     depth = np.require(image.depth, requirements=("C", "A"))
     rgb = None if image.rgb is None else np.require(image.rgb, requirements=("C", "A"))
     return image if depth is image.depth and rgb is image.rgb else replace(image, depth=depth, rgb=rgb)

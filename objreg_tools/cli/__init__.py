@@ -44,7 +44,6 @@ FOLDER = Path(__file__).parent / "commands"
 NAME = "objreg"
 BROKEN, NOTHING, INTERRUPTED, UNHEARD, TERMINATED = 1, 3, 130, 141, 143  # nothing: what was read gave no frame
 AGAIN_S = 0.05  # after which an interrupt that was swallowed comes again
-FIRST_TIME = "the first time compiles for a minute"
 
 
 class LazyGroup(click.Group):
@@ -160,7 +159,7 @@ def _ended_by_signals() -> Iterator[None]:
     """Within the block SIGTERM leaves through every `with` and `finally`, as Ctrl-C does.
 
     Libraries receive them too: ROS shuts down, an import fails. Their messages, even in place of the exit, are no
-    bug. Where one swallows the interrupt, as a compiler that calls back into Python does, it comes again.
+    bug. Where one swallows the interrupt, it comes again.
     """
     received: list[int] = []
 

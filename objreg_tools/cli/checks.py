@@ -183,7 +183,7 @@ def _profile(environment: Mapping[str, str]) -> str:
 
 
 def of_machine() -> Iterator[Check]:
-    """Where files and compiled code go, and shared memory."""
+    """Where files go, the build of the kernels, and shared memory."""
     for name, find in (("free disk here", Path.cwd), ("free disk for a while", tempfile.gettempdir)):
         yield free_disk(name, find)
     yield _shared_memory()

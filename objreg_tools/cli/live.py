@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.data.closures import LoopClosure, Rejected
-from objreg_tools.cli import FIRST_TIME
 from objreg_tools.cli.processes import Processes
 from objreg_tools.cli.verbosity import is_quiet, is_verbose
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from objreg_ros.bridge.streams.collector import Collector, LastDetections
 
 STAGES = ("detector", "segmenter", "registrar")
-START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
+START_S = 120.0  # on a machine that may be busy
 DRAIN_S = 120.0  # the last searches
 QUIET_S = 3.0  # no counter moved for so long: all is through
 
@@ -53,7 +52,7 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
     with Processes(folder, environment) as processes, _listening(environment) as collector:
         for name, module, arguments in _programs(setup):
             processes.start(name, module, arguments, quiet=not is_verbose())
-        say(f"starting three nodes ({FIRST_TIME})")
+        say("starting three nodes")
         _wait_for_nodes(collector, processes)
         say("playing")
         arguments_of_player = ["replay", str(recording), *setup.replay_args]

@@ -186,7 +186,7 @@ def test_a_node_that_ends_before_it_reports_is_told(stage: Stage) -> None:
 
 def test_nodes_that_never_report_are_told_from_those_that_do(stage: Stage) -> None:
     stage.events = [(1.0, stage.reports(detector=counters(0)))]
-    with pytest.raises(ValueError, match=r"expected detector, .* to report within 600 s, got \['/detector'\]"):
+    with pytest.raises(ValueError, match=r"expected detector, .* to report within 120 s, got \['/detector'\]"):
         stage.run()
 
 

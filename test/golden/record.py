@@ -6,8 +6,7 @@
     python test/golden/record.py --detect            the models look again, too
 
 The numbers are those of one machine: check on the one that recorded. Elsewhere test/test_golden.py compares with
-tolerances. A process that compiles kernels may give other last digits than one that loads them from a cache: after
-a change of kernels run it twice, and believe the second.
+tolerances.
 """
 
 from __future__ import annotations

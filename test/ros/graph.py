@@ -26,7 +26,7 @@ from objreg_ros.bridge.node.common import CONNECTED
 from objreg_ros.bridge.node.diagnostics import balance_of
 from objreg_ros.bridge.process import profile
 
-START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
+START_S = 120.0  # on a machine that may be busy
 ANSWER_S = 60.0
 REPOSITORY = Path(__file__).resolve().parents[2]
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOM = ("--scenario", "loop", "--seed", "1", "--frames", "60", "--size", "320x240")
-PATIENCE_S = 600.0  # a first run compiles kernels, on a machine that may be busy
+PATIENCE_S = 600.0  # on a machine that may be busy
 
 
 @dataclass(frozen=True, slots=True)

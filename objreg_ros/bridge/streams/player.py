@@ -89,7 +89,7 @@ class Player(Node):
     def subscribe_to_acknowledgements(self, seconds: float) -> Acknowledgements:
         """Wait for the nodes that acknowledgement frames; ValueError if there are none within ``seconds``.
 
-        A node that is there is waited for until it listens to its inputs: its first start compiles for a while.
+        A node that is there is waited for until it listens to its inputs.
         """
         self.create_subscription(Header, "finished", self._receive, qos.stage(depth=1000))
         self._spin_until(lambda: set(ORDER) <= self._receipting(), seconds)

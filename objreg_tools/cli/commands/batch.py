@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.whole_file import write_whole
-from objreg_tools.cli import FIRST_TIME, NOTHING, options
+from objreg_tools.cli import NOTHING, options
 from objreg_tools.cli.batch_work import BatchWork
 from objreg_tools.cli.paths import OutputPath, RecordingPath
 from objreg_tools.cli.recorded import RecordedOptions
@@ -95,7 +95,7 @@ def _differing(work: BatchWork, recording: Path) -> list[str] | None:
 def _failures(work: BatchWork, waiting: Sequence[Path], workers: int | None, scheduler: str) -> dict[Path, Exception]:
     """Do what is waiting; which recordings failed, and how."""
     if waiting:
-        click.echo(f"starting the workers ({FIRST_TIME})", err=True)
+        click.echo("starting the workers", err=True)
     failures: dict[Path, Exception] = {}
     with tqdm(total=len(waiting), unit="recording", disable=None, leave=False) as bar:
         for done in spread(work, waiting, workers, scheduler):

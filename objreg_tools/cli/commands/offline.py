@@ -12,7 +12,7 @@ import click
 from tqdm import tqdm
 
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_tools.cli import FIRST_TIME, options
+from objreg_tools.cli import options
 from objreg_tools.cli.outputs import Outputs
 from objreg_tools.cli.paths import STANDARD_OUTPUT, OutputPath
 from objreg_tools.cli.recorded import Opened, RecordedOptions
@@ -93,7 +93,7 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
 
 
 def _run(opened: Opened, registrar: RegistrarParams) -> Run:
-    click.echo(f"preparing detector, segmenter and registrar ({FIRST_TIME})", err=True)
+    click.echo("preparing detector, segmenter and registrar", err=True)
     with tqdm(total=opened.frames, unit="frame", disable=None, leave=False) as bar:
         return opened.run(registrar, lambda count: bar.update(count - bar.n))
 
