@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,7 @@ def tests_of_kernels(repository: Path) -> list[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(find_spec("objreg_ros.native.checked") is None, reason="build with OBJREG_CHECKED=1")
 def test_no_kernel_looks_beside_an_array_in_its_own_tests(repository: Path) -> None:
     files = tests_of_kernels(repository)
     assert len(files) > 25
