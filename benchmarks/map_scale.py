@@ -107,7 +107,7 @@ def shortened(words: Walk, metres: float) -> Walk:
 def at_once(words: Walk, names: list[str], with_ours: bool = True) -> dict[str, Any]:
     """Ours, without a solution before the last closure, and peers on the same graph."""
     graph, is_false, _ = filled(words, right_only=False)
-    dense, told = Dense.of(graph, graph.params.picture_sigmas), {}
+    dense, figures = Dense.of(graph, graph.params.picture_sigmas), {}
     limit = graph.params.max_residual
     work: dict[str, Callable[[], Solved]] = {"objreg": lambda: solved(graph)} if with_ours else {}
     work |= {name: lambda name=name: PEERS[name](dense, limit) for name in names}  # type: ignore[misc]
@@ -115,8 +115,8 @@ def at_once(words: Walk, names: list[str], with_ours: bool = True) -> dict[str, 
         start = time.perf_counter()
         answer = work[name]()
         seconds = time.perf_counter() - start
-        told[name] = _judged(words, graph, answer, is_false) | {"seconds": seconds, "memory_mb": memory_mb()}
-    return {"keyframes": len(dense.poses), "closures": len(is_false), "methods": told}
+        figures[name] = _judged(words, graph, answer, is_false) | {"seconds": seconds, "memory_mb": memory_mb()}
+    return {"keyframes": len(dense.poses), "closures": len(is_false), "methods": figures}
 
 
 def _judged(words: Walk, graph: PoseGraph, answer: Solved, is_false: Array) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import re
 import shutil
 import subprocess
 import sys
@@ -103,6 +104,19 @@ def test_every_file_of_kernels_is_listed_with_what_it_has(repository: Path) -> N
         found = [name for name in vars(native.kernels(header.stem)) if not name.startswith("__")]
         assert found and all(f'("{name}"' in header.read_text() for name in found)
     assert len(headers) == listed.count("::METHODS}")
+
+
+def test_a_number_that_stands_in_a_header_and_beside_it_is_the_same(repository: Path) -> None:
+    stated = re.compile(r"^constexpr \w+ (\w+) = (-?[\d.]+)f?;", re.MULTILINE)
+    found = 0
+    for header in sources.source_files(repository):
+        beside = header.parents[1] / f"{header.stem}.py"
+        python = beside.read_text() if beside.exists() else ""
+        for name, value in stated.findall(header.read_text()):
+            there = re.search(rf"^{name} = (?:np\.float32\()?(-?[\d.]+)", python, re.MULTILINE)
+            found += there is not None
+            assert there is None or float(there[1]) == float(value), f"{name} of {header}"
+    assert found >= 4
 
 
 def test_the_builds_of_one_processor_agree() -> None:

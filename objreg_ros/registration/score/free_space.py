@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from objreg_ros.data.checked import Array
 from objreg_ros.native import kernels
 
@@ -10,43 +12,12 @@ _KERNELS = kernels("free_space")
 # What `count` counts, in the order of its result.
 SEEN, INLIERS, VIOLATIONS, OCCLUDED, SHADED, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_AB = range(10)
 
-Camera = tuple[float, float, float, float]
 
-
-def count(
-    points: Array,
-    shades: Array,
-    T: Array,
-    near: Array,
-    far: Array,
-    detail: Array,
-    camera: Camera,
-    tolerance: float,
-    growth: float,
-) -> Array:
-    """Count what the view (near, far, detail, camera) says of ``points`` moved by ``T (4, 4)``.
-
-    A depth agrees within ``tolerance + growth z^2``. Returns (10,) float64 in the order SEEN ... SUM_AB; the sums are
-    of the shades of the inliers (A) and of the detail where they land (B).
-    """
-    counts: Array = _KERNELS.count(points, shades, T, near, far, detail, camera, tolerance, growth)
-    return counts
-
-
-def count_many(
-    points: Array,
-    shades: Array,
-    T: Array,
-    near: Array,
-    far: Array,
-    detail: Array,
-    camera: Camera,
-    tolerance: float,
-    growth: float,
-) -> Array:
-    """`count` for many poses (K, 4, 4): (K, 10)."""
-    counts: Array = _KERNELS.count_many(points, shades, T, near, far, detail, camera, tolerance, growth)
-    return counts
+# What a view (near, far, detail, camera) says of ``points (N, 3)`` with ``shades (N,)`` moved by ``T``. A depth agrees
+# within ``tolerance + growth z^2``; sums are of the shades of the inliers (A) and of the detail where they land (B).
+# (points, shades, T, near, far, detail, camera, tolerance, growth), camera being (fx, fy, cx, cy):
+count: Callable[..., Array] = _KERNELS.count  # T (4, 4): (10,) float64 in the order SEEN ... SUM_AB
+count_many: Callable[..., Array] = _KERNELS.count_many  # T (K, 4, 4): (K, 10)
 
 
 def correlation(counts: Array) -> float:

@@ -26,7 +26,6 @@ GREY_NOISE = 12.0  # standard deviation of grey that is noise, in grey levels
 # What `tally` counts.
 INLIERS, VIOLATIONS, HIDDEN, RESIDUAL, SHADED, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_AB = range(10)
 COUNTS = 10
-LEAST_SHADED = 20
 STEPS = 8  # rounds of a climb to what is nearby, each a step of that share of its reach at most
 
 
