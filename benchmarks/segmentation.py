@@ -122,7 +122,7 @@ def remove_planes(labelled: LabelledImage, boxes: list[tuple[int, int, int, int]
             cloud.select_by_index(on_plane, invert=True)
 
 
-FARTHEST_PAPER = SegmenterParams(preset=PAPER).limits[0]
+FARTHEST_PAPER = SegmenterParams(preset=PAPER).limits[1]
 
 
 def timings(images: list[LabelledImage], segmenter: Segmenter, repeats: int, rng: Any) -> dict[str, float]:
