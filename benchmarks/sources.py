@@ -145,7 +145,7 @@ class Source:
 class Unturned(DepthToColour):
     """Leaves depth beside colour as it comes."""
 
-    def register(self, image: DepthImage) -> DepthImage:
+    def register(self, image: DepthImage, noise: float) -> DepthImage:
         """The image itself."""
         return image
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rotation that brings depth upon colour, found in every frame: where depth steps, colour has an edge.
+"""The rotation that brings depth upon colour: where depth steps, colour has an edge.
 
 Depth that was exposed before or after colour, or whose camera is not quite where its calibration says, is beside the
 colour by some pixels. A camera that turns by 100 degrees a second turns by 2.5 degrees in a lag of 25 ms. Both are a
 small rotation between the two cameras. It is the one that puts depth steps on the strongest gradients of grey:
 the alignment of depth and colour edges (Levinson and Thrun, "Automatic online calibration of cameras and lasers",
-2013), here for each frame by itself, with the result of earlier frames as its prior.
+2013), here for one frame by itself, with the result of earlier frames as its prior. It is measured in every frame of a
+stream whose frames differ, as those of a camera that turns fast, and a few times a second in others.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.limits import MOST_DEPTH
 from objreg_ros.native import kernels
-from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M, depth_noise, thinned
+from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
 _KERNELS = kernels("depth_to_colour")
 WIDTH = 320  # px: the picture is halved until it is no wider
@@ -41,6 +42,8 @@ SURPRISE = 3.0  # deviations: a larger difference is clipped to this
 MEMORY = 20  # frames that are remembered
 FIRST_FRAMES = 0.2  # the weight of the first guess of the spread, in frames
 MATCHED = 1.5  # noise of depth in a Kinect's: simulated and real Kinects have 0.9 to 1.4, a RealSense D435 1.8 and more
+DIFFER = 0.004  # rad, two pixels of the usual camera: where frames spread by more, each is measured
+EVERY_S = 0.2  # else the offset of a frame is that of one so long before: it changes by half a pixel, as it errs
 SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
 
@@ -56,7 +59,7 @@ class DepthToColour:
     """The offset of one stream; remembers the offsets of its frames, until another camera comes.
 
     ``mean (3,)`` and ``spread (3,)`` rad are of the measured offsets, in so many ``frames``. ``found (3,)`` rad
-    is that of the last frame by itself, None where it has none.
+    is that of the last frame by itself, None where it has none or was not measured.
     """
 
     mean: Array = field(default_factory=lambda: np.zeros(3))
@@ -64,6 +67,9 @@ class DepthToColour:
     frames: int = 0
     found: Array | None = None
     _camera: tuple[Any, ...] | None = None
+    _measured: int = 0  # frames
+    _stamp_ns: int = 0  # of the last of them
+    _rotation: Array = field(default_factory=lambda: np.zeros(3))  # of it
 
     def text(self) -> str:
         """How depth is turned against colour, as text; empty where no frame showed it."""
@@ -77,22 +83,31 @@ class DepthToColour:
     def forget_stream(self) -> None:
         """Begin with another stream."""
         self.mean, self.spread, self.frames = np.zeros(3), np.full(3, FIRST_SIGMA), 0
-        self.found = None
+        self.found, self._measured = None, 0
 
-    def register(self, image: DepthImage) -> DepthImage:
+    def register(self, image: DepthImage, noise: float) -> DepthImage:
         """The image with its depth brought upon its colour; itself where it has no colour or nothing is to be done.
 
-        Depth of a stereo camera is left as it is: its steps are half a matching window beside the objects.
+        Depth of a stereo camera is left as it is: its steps are half a matching window beside the objects. It is known
+        by its ``noise``, in a Kinect's, which no other camera has.
         """
-        if image.rgb is None or is_matched(image):
-            self.found = None
+        self.found = None
+        if image.rgb is None or noise > MATCHED:
             return image
-        rotation = self.offset(image).rotation
-        return image if np.abs(rotation).max() < SMALLEST else turned(image, rotation)
+        if self._is_due(image):
+            self._rotation, self._stamp_ns = self.offset(image).rotation, image.stamp_ns
+            self._measured += 1
+        return image if np.abs(self._rotation).max() < SMALLEST else turned(image, self._rotation)
+
+    def _is_due(self, image: DepthImage) -> bool:
+        """Whether the offset of a frame is measured: of a stream that is new, or whose frames differ, that of each."""
+        if self._camera != _identity(image) or self._measured < MEMORY or self.spread.max() > DIFFER:
+            return True
+        return not 0.0 <= 1e-9 * (image.stamp_ns - self._stamp_ns) < EVERY_S
 
     def offset(self, image: DepthImage) -> DepthOffset:
         """The offset of a frame, by its edges and by the frames before; those alone where it has few edges."""
-        camera = image.frame_id, image.depth.shape, _reduced(image.intrinsics, 1)
+        camera = _identity(image)
         if self._camera not in (None, camera):
             self.forget_stream()
         self._camera = camera
@@ -112,11 +127,6 @@ class DepthToColour:
         away = np.clip(rotation - self.mean, -SURPRISE * self.spread, SURPRISE * self.spread)
         self.mean = self.mean + away / (1.0 + min(self.frames - 1, MEMORY))
         self.spread = np.maximum(np.sqrt((known * self.spread**2 + away**2) / (known + 1.0)), NOISE)
-
-
-def is_matched(image: DepthImage) -> bool:
-    """Whether depth is that of a stereo camera, which matches windows: it has more noise than any other."""
-    return depth_noise(thinned(image.depth)) > MATCHED
 
 
 def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None:
@@ -151,6 +161,11 @@ def turned(image: DepthImage, rotation: Array) -> DepthImage:
     camera = _reduced(image.intrinsics, 1)
     depth = _KERNELS.turned(image.depth, camera, np.asarray(rotation, np.float64), MOST_DEPTH)
     return replace(image, depth=depth)
+
+
+def _identity(image: DepthImage) -> tuple[Any, ...]:
+    """What is another camera where it differs."""
+    return image.frame_id, image.depth.shape, _reduced(image.intrinsics, 1)
 
 
 def _reduced(camera: Intrinsics, every: int) -> tuple[float, float, float, float]:

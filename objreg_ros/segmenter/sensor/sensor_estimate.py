@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -58,44 +59,67 @@ class TurnSample(NamedTuple):
     offset: Array
 
 
+class _Picture:
+    """A picture, reduced once it is asked for."""
+
+    def __init__(self, image: DepthImage) -> None:
+        assert image.rgb is not None
+        height, width = image.rgb.shape[:2]
+        self._rgb, self.stamp_ns = image.rgb, image.stamp_ns
+        self._every = max(1, min(width // PICTURE_WIDTH, height))  # a strip keeps a row
+        self.focal = np.array([image.intrinsics.fx, image.intrinsics.fy]) / self._every
+        self._motion: dict[int, Array | None] = {}
+
+    @cached_property
+    def grey(self) -> Array:
+        """(h, w) float32."""
+        scale = 1.0 / self._every
+        small = cv2.resize(self._rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
+
+    def velocity_from(self, last: _Picture) -> Array | None:
+        """The angular velocity (2,) rad/s by which the ``last`` picture became this one; None where it is not known."""
+        if last.stamp_ns not in self._motion:
+            self._motion[last.stamp_ns] = self._measured_from(last)
+        return self._motion[last.stamp_ns]
+
+    def _measured_from(self, last: _Picture) -> Array | None:
+        seconds = 1e-9 * (self.stamp_ns - last.stamp_ns)
+        if not 0.0 < seconds <= LONGEST_S or last.grey.shape != self.grey.shape or min(self.grey.shape) == 1:
+            return None  # one row shows no motion
+        shift, response = cv2.phaseCorrelate(last.grey, self.grey, _window(self.grey.shape))
+        if response < LEAST_RESPONSE or max(np.abs(shift)) > MOST_SHIFT * self.grey.shape[1]:
+            return None
+        right, down = np.array(shift) / (self.focal * seconds)
+        return np.array([down, -right])
+
+
+@lru_cache(maxsize=2)
+def _window(hw: tuple[int, int]) -> Array:
+    return np.asarray(cv2.createHanningWindow(hw[::-1], cv2.CV_32F))
+
+
 @dataclass(slots=True, eq=False)
 class PictureMotion:
     """How fast a picture moves about each frame: the mean of before and after, so it is known one frame later."""
 
-    _grey: Array | None = None
-    _window: Array | None = None
-    _stamp_ns: int = 0
-    _before: Array | None = None  # (2,) rad/s: from the frame before the last to the last
+    _seen: deque[_Picture] = field(default_factory=lambda: deque(maxlen=3))
 
     def forget_stream(self) -> None:
         """Begin with another stream."""
-        self._grey, self._before = None, None
+        self._seen.clear()
 
-    def see(self, image: DepthImage) -> Array | None:
-        """The angular velocity (2,) rad/s about x and y at the frame before this one; None where it is not known."""
-        assert image.rgb is not None
-        height, width = image.rgb.shape[:2]
-        every = max(1, min(width // PICTURE_WIDTH, height))  # a strip keeps a row
-        small = cv2.resize(image.rgb, None, fx=1.0 / every, fy=1.0 / every, interpolation=cv2.INTER_AREA)
-        grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
-        seconds = 1e-9 * (image.stamp_ns - self._stamp_ns)
-        same = self._grey is not None and self._grey.shape == grey.shape and 0.0 < seconds <= LONGEST_S
-        same = same and min(grey.shape) > 1  # one row shows no motion
-        focal = np.array([image.intrinsics.fx, image.intrinsics.fy]) / every
-        after = self._moved(grey, focal, seconds) if same else None
-        before, self._before, self._grey, self._stamp_ns = self._before, after, grey, image.stamp_ns
-        return None if before is None or after is None else 0.5 * (before + after)
+    def see(self, image: DepthImage) -> None:
+        """Take the next picture; nothing is measured before `velocity` is asked for."""
+        self._seen.append(_Picture(image))
 
-    def _moved(self, grey: Array, focal: Array, seconds: float) -> Array | None:
-        """The angular velocity (2,) rad/s by which the last picture became this one."""
-        if self._window is None or self._window.shape != grey.shape:
-            self._window = np.asarray(cv2.createHanningWindow(grey.shape[::-1], cv2.CV_32F))
-        assert self._grey is not None
-        shift, response = cv2.phaseCorrelate(self._grey, grey, self._window)
-        if response < LEAST_RESPONSE or max(np.abs(shift)) > MOST_SHIFT * grey.shape[1]:
+    def velocity(self) -> Array | None:
+        """The angular velocity (2,) rad/s about x and y at the frame before the last; None where it is not known."""
+        if len(self._seen) < 3:
             return None
-        right, down = np.array(shift) / (focal * seconds)
-        return np.array([down, -right])
+        first, middle, last = self._seen
+        before, after = middle.velocity_from(first), last.velocity_from(middle)
+        return None if before is None or after is None else 0.5 * (before + after)
 
 
 @dataclass(slots=True, eq=False)
@@ -105,6 +129,7 @@ class SensorEstimate:
     depth_to_colour: DepthToColour = field(default_factory=DepthToColour)
     _motion: PictureMotion = field(default_factory=PictureMotion)
     _turns: deque[TurnSample] = field(default_factory=lambda: deque(maxlen=TURNS))
+    noise: float | None = None  # of depth in that of a Kinect v1, the median of the last frames with one
     _noises: deque[float] = field(default_factory=lambda: deque(maxlen=NOISES))
     _seen: int = 0
     _camera: tuple[str, tuple[int, ...]] | None = None
@@ -119,7 +144,7 @@ class SensorEstimate:
         self._motion.forget_stream()
         self._turns.clear()
         self._noises.clear()
-        self._seen, self._waiting = 0, None
+        self.noise, self._seen, self._waiting = None, 0, None
 
     def register(self, image: DepthImage) -> DepthImage:
         """The image with its depth brought upon its colour, as `DepthToColour.register` does; measures both.
@@ -133,27 +158,25 @@ class SensorEstimate:
         if self._seen % NOISE_EVERY == 0:
             self._measure_noise(image)
         self._seen += 1
-        registered = self.depth_to_colour.register(image)
+        registered = self.depth_to_colour.register(image, self.noise or 1.0)
         if image.rgb is not None:
             self._note_turn(image)
         return registered
 
     def _note_turn(self, image: DepthImage) -> None:
-        """Put the offset of the frame before beside its velocity, which is known with this frame."""
-        velocity, found = self._motion.see(image), self.depth_to_colour.found
+        """Put the offset of the frame before, if it was measured, beside its velocity, which is known with this one."""
+        self._motion.see(image)
+        velocity = None if self._waiting is None else self._motion.velocity()
         if velocity is not None and self._waiting is not None:
             self._turns.append(TurnSample(self._waiting[0], velocity, self._waiting[1]))
+        found = self.depth_to_colour.found
         self._waiting = None if found is None else (1e-9 * image.stamp_ns, found[:2])
 
     def _measure_noise(self, image: DepthImage) -> None:
         noise = measured_noise(thinned(image.depth))
         if noise is not None:
             self._noises.append(noise)
-
-    @property
-    def noise(self) -> float | None:
-        """The noise of depth in that of a Kinect v1, the median of the last frames with one; None before any."""
-        return float(np.median(self._noises.copy())) if self._noises else None
+            self.noise = float(np.median(self._noises))
 
     @property
     def lag(self) -> Lag | None:

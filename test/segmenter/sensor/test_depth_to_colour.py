@@ -12,7 +12,14 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.limits import MOST_DEPTH
-from objreg_ros.segmenter.sensor.depth_to_colour import FIRST_SIGMA, NOISE, DepthToColour, find_rotation, turned
+from objreg_ros.segmenter.sensor.depth_to_colour import (
+    FIRST_SIGMA,
+    MEMORY,
+    NOISE,
+    DepthToColour,
+    find_rotation,
+    turned,
+)
 
 CAMERA = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
 WALL = 2.5  # m
@@ -24,6 +31,7 @@ BOARDS = (  # left, top, width, height, depth in m
 )
 WIDE = np.full(3, 0.03)
 LAG = np.array([0.012, -0.020, 0.025])
+KINECT = 1.0  # noise
 
 
 def rays() -> Array:
@@ -78,7 +86,7 @@ def test_what_no_depth_pixel_saw_is_none() -> None:
 def test_a_picture_without_depth_steps_tells_nothing_and_is_turned_as_those_before() -> None:
     stream = DepthToColour()
     for k in range(20):
-        stream.register(image(LAG, 0.01 * k))
+        stream.register(image(LAG, 0.01 * k), KINECT)
     bare = image(LAG)
     plain = DepthImage(depth=np.full_like(bare.depth, 2.0), rgb=bare.rgb, intrinsics=CAMERA, stamp_ns=0)
     offset = stream.offset(plain)
@@ -88,7 +96,7 @@ def test_a_picture_without_depth_steps_tells_nothing_and_is_turned_as_those_befo
 def test_depth_without_colour_is_left_as_it_is() -> None:
     plain = image(LAG)
     without = DepthImage(depth=plain.depth, rgb=None, intrinsics=CAMERA, stamp_ns=0)
-    assert DepthToColour().register(without) is without
+    assert DepthToColour().register(without, KINECT) is without
 
 
 def test_a_stream_whose_frames_agree_takes_their_mean_and_one_that_turns_takes_each() -> None:
@@ -112,7 +120,7 @@ def test_one_frame_that_errs_hardly_moves_what_is_remembered() -> None:
 def test_another_camera_begins_anew() -> None:
     stream = DepthToColour()
     for k in range(20):
-        stream.register(image(LAG, 0.01 * k))
+        stream.register(image(LAG, 0.01 * k), KINECT)
     other = replace(image(np.zeros(3)), frame_id="another")
     assert stream.offset(other).rotation == pytest.approx(np.zeros(3), abs=0.002) and stream.frames == 1
 
@@ -163,7 +171,26 @@ def test_what_the_raw_picture_showed_is_kept() -> None:
 
 def test_depth_of_a_stereo_camera_is_left_as_it_is() -> None:
     late = image(LAG)
-    noise = 0.004 * late.depth**2 * np.random.default_rng(0).normal(size=late.depth.shape)
-    stereo = replace(late, depth=(late.depth + noise).astype(np.float32))
-    assert DepthToColour().register(stereo) is stereo
-    assert DepthToColour().register(late) is not late
+    assert DepthToColour().register(late, 2.0) is late
+    assert DepthToColour().register(late, KINECT) is not late
+
+
+def frames_measured(turn: float, seconds: float) -> list[bool]:
+    """Whether each of ten frames, ``seconds`` apart, is measured of a stream whose frames spread by ``turn`` rad."""
+    stream, rng = DepthToColour(), np.random.default_rng(0)
+    still = [replace(image(LAG), stamp_ns=round(1e9 * seconds * k)) for k in range(MEMORY + 10)]
+    for one in still[:MEMORY]:
+        stream.register(one, KINECT)
+    for _ in range(40):
+        stream._remember(LAG + turn * rng.normal(size=3))
+    stream.spread = np.maximum(stream.spread, turn)
+    return [stream.register(one, KINECT) is not one and stream.found is not None for one in still[MEMORY:]]
+
+
+def test_a_stream_whose_frames_agree_is_measured_a_few_times_a_second() -> None:
+    assert sum(frames_measured(0.0, 0.05)) == 2  # of ten frames in half a second
+    assert all(frames_measured(0.0, 0.25))
+
+
+def test_a_stream_whose_frames_differ_is_measured_in_each() -> None:
+    assert all(frames_measured(0.02, 0.05))

@@ -5,7 +5,7 @@
 
 namespace objreg::depth_to_colour {
 constexpr i64 SHADOW = 3;           // px: the depth behind a step may be missing for as far
-constexpr double LEAST_AWAY = 0.1;  // m before the camera, of a ray that is 1 m long along the other's axis
+constexpr float LEAST_AWAY = 0.1f;  // m before the camera, of a ray that is 1 m long along the other's axis
 
 using Camera = std::array<double, 4>;  // fx, fy, cx, cy
 using Turn = std::array<double, 3>;    // rad
@@ -138,33 +138,38 @@ inline Array<double, 1> climbed(View<const double, 2> rays, View<const float, 2>
 }
 
 // Depth (H, W) as a camera sees it from which the depth camera is turned away; the nearest pixel's, 0 beyond and for
-// more than `most`.
+// more than `most`. In float32: a ten-thousandth of a pixel.
 inline Array<float, 2> turned(View<const float, 2> depth, Camera camera, View<const double, 1> rotation, double most) {
   const i64 height = depth.shape[0], width = depth.shape[1];
-  const auto [fx, fy, cx, cy] = camera;
-  const double a = rotation(0), b = rotation(1), c = rotation(2);
+  const float fx = float(camera[0]), fy = float(camera[1]), cx = float(camera[2]), cy = float(camera[3]);
+  const float a = float(rotation(0)), b = float(rotation(1)), c = float(rotation(2)), farthest = float(most);
+  const float right = width - 0.5f, bottom = height - 0.5f;
   Array<float, 2> out(height, width);
-  Array<double, 1> nears(width);
-  Array<i32, 1> rows(width), columns(width);
-  double *__restrict nearness = nears.data;
-  i32 *__restrict from_row = rows.data;
-  i32 *__restrict from_column = columns.data;
+  Array<float, 1> nears(width), slopes(width);
+  Array<i32, 1> places(width);
+  float *__restrict nearness = nears.data;
+  float *__restrict slope = slopes.data;
+  i32 *__restrict place = places.data;
+  const i32 columns = static_cast<i32>(width), rows_apart = static_cast<i32>(depth.stride[0]);
+  for (i32 column = 0; column < columns; column++) slope[column] = (float(column) - cx) / fx;
   for (i64 row = 0; row < height; row++) {
-    const double y = (row - cy) / fy;
-    for (i32 column = 0; column < width; column++) {  // without branches, for the vectors
-      const double x = (column - cx) / fx;
-      const double away = 1.0 - a * y + b * x;  // the rotation back, of a ray of the colour camera
-      const double near = 1.0 / away;
-      const double u = fx * (x - b + c * y) * near + cx, v = fy * (y - c * x + a) * near + cy;
-      const bool seen =
-          (away > LEAST_AWAY) & (u > -0.5) & (v > -0.5) & (u < width - 0.5) & (v < height - 0.5);
-      nearness[column] = seen ? near : 0.0;
-      from_row[column] = static_cast<i32>(seen ? v + 0.5 : 0.0);
-      from_column[column] = static_cast<i32>(seen ? u + 0.5 : 0.0);
+    const float y = (float(row) - cy) / fy;
+    for (i32 column = 0; column < columns; column++) {  // without branches, for the vectors
+      const float x = slope[column];
+      const float away = 1.0f - a * y + b * x;  // the rotation back, of a ray of the colour camera
+      const float near = 1.0f / away;
+      const float u = fx * (x - b + c * y) * near + cx, v = fy * (y - c * x + a) * near + cy;
+      const bool seen = (away > LEAST_AWAY) & (u > -0.5f) & (v > -0.5f) & (u < right) & (v < bottom);
+      nearness[column] = seen ? near : 0.0f;
+      const float from_row = seen ? v + 0.5f : 0.0f, from_column = seen ? u + 0.5f : 0.0f;
+      place[column] = static_cast<i32>(from_row) * rows_apart + static_cast<i32>(from_column);
     }
-    for (i64 column = 0; column < width; column++) {
-      const double z = depth(rows(column), columns(column)) * nears(column);
-      out(row, column) = z <= most ? static_cast<float>(z) : 0.0f;
+    const float *__restrict from = depth.data;
+    float *__restrict to = out.row(row).data;
+    for (i32 column = 0; column < columns; column++) {
+      check(place[column] / rows_apart, height);
+      const float z = from[place[column]] * nearness[column];
+      to[column] = z <= farthest ? z : 0.0f;
     }
   }
   return out;
