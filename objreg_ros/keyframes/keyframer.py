@@ -3,7 +3,7 @@
 
 This is the part that runs on every frame, so it only tracks and collects; `fusion` makes a keyframe of a frame window.
 A frame window ends when the camera has moved or enough time has passed, and is dropped when it shows nothing new: a
-camera that rests makes one keyframe, not one a second.
+camera that rests makes one keyframe, not one a second. One that has all its frames is handed over before its end.
 """
 
 from __future__ import annotations
@@ -97,6 +97,7 @@ class _Open:
     frames: list[Frame] = field(default_factory=list)
     motions: list[Array] = field(default_factory=list)
     T_first_last: Array = field(default_factory=lambda: np.eye(4))
+    is_handed_over: bool = False
 
     @property
     def by_odometry(self) -> bool:
@@ -104,7 +105,7 @@ class _Open:
 
 
 class Keyframer:
-    """Collects frames into frame windows. ``add_frame`` returns the frame window that a frame ended, or None.
+    """Collects frames into frame windows. ``add_frame`` returns the one that a frame ended or made full, or None.
 
     ``numbers`` gives each session its number; keyframers that share it have none in common.
     """
@@ -157,7 +158,7 @@ class Keyframer:
             self._begin(session, frame, T_session_frame)
         else:
             self._collect(self._open, frame, inverse(self._open.T_session_first) @ T_session_frame)
-        return ended
+        return ended or self._full_window(self._open)
 
     def finish_window(self) -> FrameWindow | None:
         """End the frame window that is being collected: None if there is none or it shows nothing new.
@@ -196,7 +197,18 @@ class Keyframer:
 
     def _end(self) -> FrameWindow | None:
         window, self._open = self._open, None
-        if window is None or not window.frames:
+        return None if window is None or window.is_handed_over else self._window_of(window)
+
+    def _full_window(self, window: _Open | None) -> FrameWindow | None:
+        """One that takes no more frames, once: it need not wait for its end, which changes nothing of it."""
+        if window is None or window.is_handed_over or len(window.frames) < MOST_FRAMES:
+            return None
+        window.is_handed_over = True
+        return self._window_of(window)
+
+    def _window_of(self, window: _Open) -> FrameWindow | None:
+        """What was collected; None where it shows nothing new."""
+        if not window.frames:
             return None
         labels: Counter[str] = Counter()
         for frame in window.frames:

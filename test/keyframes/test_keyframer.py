@@ -39,6 +39,19 @@ def test_a_moving_camera_makes_a_keyframe_each_time_it_has_moved_enough() -> Non
     assert np.allclose(windows[1].T_first_frame[-1], moved(0.09))
 
 
+def test_a_keyframe_that_has_all_its_frames_is_handed_over_once_and_before_its_end() -> None:
+    keyframer = Keyframer(PARAMS)
+    ended = [keyframer.add_frame(frame(0.1 * i, CUP, moved(0.03 * i))) for i in range(8)]
+    assert [i for i, window in enumerate(ended) if window is not None] == [3, 7]
+    assert keyframer.finish_window() is None
+
+
+def test_a_keyframe_that_lacks_frames_waits_for_its_end() -> None:
+    keyframer = Keyframer(PARAMS)
+    ended = [keyframer.add_frame(frame(0.3 * i, CUP, moved(0.03 * min(i, 2)))) for i in range(5)]
+    assert [None if window is None else len(window.frames) for window in ended] == [None, None, None, None, 3]
+
+
 def test_a_camera_that_rests_makes_one_keyframe_until_something_new_comes() -> None:
     rest = [frame(0.2 * i, CUP, np.eye(4)) for i in range(20)]
     new = [frame(4.0 + 0.2 * i, (*CUP, box("book", (0.5, 0, 1))), np.eye(4)) for i in range(20)]
