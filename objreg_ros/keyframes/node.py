@@ -70,6 +70,7 @@ class KeyframerNode(FramesNode):
             window = self._keyframer.add_frame(frame)
             self._seen_s = time.monotonic()
         if window is not None:
+            self.hand_on(stamp_ns)
             self._sender.put((stamp_ns, window))
         return window is None
 

@@ -57,9 +57,9 @@ class Job(NamedTuple):
 class RegistrarNode(FramesNode):
     """Follows every frame; searches, in a second worker, for the places that a keyframe shows again.
 
-    A frame that completes a keyframe is in the counters until its search is over. A keyframe that a newer one overtakes
-    is stored without a search: nothing that was seen is lost. A search that newer ones wait for is cut short, and no
-    frame is followed while too many wait.
+    A frame that completes a keyframe is acknowledged at once as followed, and is in the counters until its search is
+    over. A keyframe that a newer one overtakes is stored without a search: nothing that was seen is lost. A search that
+    newer ones wait for is cut short, and no frame is followed while too many wait.
 
     With ``robots`` it follows no frame: keyframes come from keyframers. Robots take turns, each with its oldest
     keyframe; `BEHIND` of them may wait before the oldest is stored without a search. With ``exchange`` it asks other
@@ -147,6 +147,7 @@ class RegistrarNode(FramesNode):
             with self.accounting.timed("track"):
                 window = self._registrar.track(frame)
             if window is not None:
+                self.hand_on(stamp_ns)
                 self.searcher.put(Job(stamp_ns, window, time.monotonic()))
         self._whereabouts.mounted(T_body_camera)
         self._whereabouts.look()

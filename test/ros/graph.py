@@ -146,7 +146,8 @@ class Graph:
 
     @staticmethod
     def _is_of(message: Header, node: str, stamp_ns: int) -> bool:
-        return message.frame_id.startswith(f"{node} ") and headers.stamp_ns(message) == stamp_ns
+        of_node = message.frame_id.startswith(f"{node} ") and headers.stamp_ns(message) == stamp_ns
+        return of_node and message.frame_id != f"{node} followed"  # whose end is yet to come
 
     def balance(self, name: str, received: int) -> Balance:
         """The counters of a node once it has told that it received so many."""

@@ -75,6 +75,11 @@ def finished(node: str, stamp_ns: int, reason: str = "") -> Header:
     return header(stamp_ns, f"{node} dropped {reason}" if reason else f"{node} published")
 
 
+def followed(node: str, stamp_ns: int) -> Header:
+    """The acknowledgement of a frame whose own work is done at ``node``, while the keyframe that it completed waits."""
+    return header(stamp_ns, f"{node} followed")
+
+
 # Pictures and clouds
 
 

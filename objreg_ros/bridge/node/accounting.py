@@ -2,7 +2,8 @@
 """The counters of a node: where every input frame is, and how long it took. Knows no ROS.
 
 Every frame that is received ends as published or as dropped with a reason, exactly once, and waits until then:
-received = published + waiting + dropped, at all times.
+received = published + waiting + dropped, at all times. ``total`` is from arrival until a frame's own work is done, and
+``keyframe`` from there until the keyframe that it completed is done too.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ class Accounting:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._arrived: defaultdict[int, list[float]] = defaultdict(list)
+        self._handed_on: defaultdict[int, list[float]] = defaultdict(list)  # when, of those that wait
         self._received = self._published = 0
         self._dropped: Counter[str] = Counter()
         self._lost: Counter[str] = Counter()
@@ -48,10 +50,21 @@ class Accounting:
             self._received += 1
             self._arrived[stamp_ns].append(time.perf_counter())
 
+    def hand_on(self, stamp_ns: int) -> None:
+        """The own work of a waiting frame is done, its keyframe's is not; KeyError if none of this stamp waits."""
+        with self._lock:
+            now, arrived = time.perf_counter(), self._arrived.get(stamp_ns)
+            if not arrived:
+                raise KeyError(f"no frame of {stamp_ns} ns waits")
+            self._stages["total"].append(now - arrived[0])
+            self._handed_on[stamp_ns].append(now)
+
     def publish(self, stamp_ns: int) -> None:
         """A waiting frame went out; KeyError if none of this stamp waits."""
         with self._lock:
-            self._stages["total"].append(time.perf_counter() - self._settle(stamp_ns))
+            arrived, handed_on = self._settle(stamp_ns)
+            stage, since = ("total", arrived) if handed_on is None else ("keyframe", handed_on)
+            self._stages[stage].append(time.perf_counter() - since)
             self._published += 1
 
     def drop(self, stamp_ns: int, reason: str) -> None:
@@ -91,14 +104,22 @@ class Accounting:
                 stage_ms=stage_ms,
             )
 
-    def _settle(self, stamp_ns: int) -> float:
-        arrivals = self._arrived.get(stamp_ns, [])
-        if not arrivals:
+    def _settle(self, stamp_ns: int) -> tuple[float, float | None]:
+        """When the first frame of a stamp that waits arrived, and was handed on if it was."""
+        arrived = _pop(self._arrived, stamp_ns)
+        if arrived is None:
             raise KeyError(f"no frame of {stamp_ns} ns waits")
-        arrived = arrivals.pop(0)
-        if not arrivals:
-            del self._arrived[stamp_ns]
-        return arrived
+        return arrived, _pop(self._handed_on, stamp_ns)
+
+
+def _pop(times: dict[int, list[float]], stamp_ns: int) -> float | None:
+    """Take the first time of a stamp out; None if there is none."""
+    if not (kept := times.get(stamp_ns)):
+        return None
+    first = kept.pop(0)
+    if not kept:
+        del times[stamp_ns]
+    return first
 
 
 def percentiles_ms(seconds: deque[float] | list[float]) -> tuple[float, float]:

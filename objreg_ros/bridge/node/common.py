@@ -35,7 +35,8 @@ class CommonDiagnostics(Diagnostics):
     rate: float = reading("rate [Hz]", "What came in each second since the last report.", "Hz", "{:.2f}")
     median_ms: Mapping[str, float] = family(
         f"{LATENCY}<stage> p50 [ms]",
-        "The median duration of a stage of the work; `total` is from arrival to publication.",
+        "The median duration of a stage of the work; `total` is from arrival until a frame's own work is done, "
+        "`keyframe` from there until the keyframe that it completed is done.",
         "ms",
         "{:.2f}",
     )

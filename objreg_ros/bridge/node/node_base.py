@@ -92,7 +92,7 @@ class NodeBase(ServingNode):
     def compute(self, stamp_ns: int, payload: Any) -> bool:
         """Read → compute → write for one frame, on the worker. `DroppedError`, ValueError or OSError if it cannot be.
 
-        True when that was all; False when the frame goes on to another worker, which calls `conclude`.
+        True when that was all; False when the frame was `hand_on`ed to another worker, which calls `conclude`.
         """
         raise NotImplementedError
 
@@ -254,6 +254,11 @@ class NodeBase(ServingNode):
         if not self.is_active:
             self.leave_out(stamp_ns, INACTIVE)
         return self.is_active
+
+    def hand_on(self, stamp_ns: int) -> None:
+        """The frame's own work is done, and another worker has its keyframe now: acknowledged, and in the counters."""
+        self.accounting.hand_on(stamp_ns)
+        self._finished.publish(to_msg.followed(self.get_name(), stamp_ns))
 
     def drop(self, stamp_ns: int, reason: str, text: str = "") -> None:
         """The frame ends here: counted by reason, receipted, and logged (throttled) if there is a ``text``."""

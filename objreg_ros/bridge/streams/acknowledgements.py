@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which frames are still in flight through the graph, by the `finished` acknowledgements of its nodes. Knows no ROS.
 
-An acknowledgement is a Header: the stamp of the frame, and ``"<node> published"`` or ``"<node> dropped <reason>"``.
+An acknowledgement is a Header: the stamp of the frame, and ``"<node> published"`` or ``"<node> dropped <reason>"``. By
+``"<node> followed"`` a frame goes on, and its end comes later.
 Colour and depth of a frame may have stamps of their own, so they are followed apart: an image until the detector is
 done with it, depth until the last node is.
 """
@@ -44,11 +45,12 @@ class Acknowledgements:
     def read_acknowledgement(self, text: str, stamp_ns: int) -> None:
         """An acknowledgement came; one that says nothing we know is left aside."""
         node, _, verdict = text.partition(" ")
-        if node not in ORDER or not verdict:
+        is_dropped = verdict.startswith("dropped")
+        if node not in ORDER or not (is_dropped or verdict == "published"):
             return
         self.outcomes[node][verdict] += 1
         kind = IMAGE if node == DETECTOR else DEPTH
-        ends = node in (DETECTOR, self.nodes[-1]) or verdict.startswith("dropped")
+        ends = node in (DETECTOR, self.nodes[-1]) or is_dropped
         if ends and self._in_flight[kind][stamp_ns] > 0:
             self._in_flight[kind][stamp_ns] -= 1
 

@@ -286,6 +286,11 @@ def test_a_receipt_tells_the_node_the_frame_and_what_became_of_it() -> None:
     assert headers.stamp_ns(published) == STAMP
 
 
+def test_the_receipt_of_a_frame_whose_keyframe_waits_says_that_it_was_followed() -> None:
+    receipt = to_msg.followed("registrar", STAMP)
+    assert (receipt.frame_id, headers.stamp_ns(receipt)) == ("registrar followed", STAMP)
+
+
 @pytest.mark.parametrize("stamp_ns", [-(2**31) * 10**9 - 1, 2**31 * 10**9])
 def test_a_stamp_beyond_32_bits_of_seconds_is_refused_and_not_cut(stamp_ns: int) -> None:
     with pytest.raises(ValueError, match=f"expected seconds of 32 bits, got {stamp_ns} ns"):

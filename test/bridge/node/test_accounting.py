@@ -37,6 +37,20 @@ def test_a_frame_cannot_end_twice() -> None:
     assert accounting.balance().dropped == {}
 
 
+def test_a_frame_that_is_handed_on_waits_and_its_keyframe_is_timed_apart() -> None:
+    accounting = Accounting()
+    for stamp_ns in (5, 6):
+        accounting.count_frame(stamp_ns)
+    accounting.hand_on(5)
+    assert accounting.balance().waiting == 2 and set(accounting.balance().stage_ms) == {"total"}
+    accounting.publish(5)
+    accounting.publish(6)
+    counters = accounting.balance()
+    assert (counters.published, counters.waiting, set(counters.stage_ms)) == (2, 0, {"total", "keyframe"})
+    with pytest.raises(KeyError, match="no frame of 5 ns waits"):
+        accounting.hand_on(5)
+
+
 def test_two_frames_of_one_stamp_are_two_frames() -> None:
     accounting = Accounting()
     accounting.count_frame(0)

@@ -16,6 +16,15 @@ def test_depth_is_through_when_the_last_node_has_published_it() -> None:
     assert acknowledgements.waiting(DEPTH) == 0
 
 
+def test_depth_whose_frame_was_followed_waits_for_the_search_of_its_keyframe() -> None:
+    acknowledgements = Acknowledgements(ORDER)
+    acknowledgements.send(DEPTH, 5)
+    acknowledgements.read_acknowledgement("registrar followed", 5)
+    assert acknowledgements.waiting(DEPTH) == 1 and not acknowledgements.outcomes
+    acknowledgements.read_acknowledgement("registrar published", 5)
+    assert acknowledgements.waiting(DEPTH) == 0
+
+
 def test_an_image_is_through_when_the_detector_is_done_with_it() -> None:
     acknowledgements = Acknowledgements(ORDER)
     for stamp_ns, verdict in ((4, "detector published"), (5, "detector dropped malformed_image")):
