@@ -2,12 +2,15 @@
 """The live graph at the camera's rate with 1, 4 and 8 objects in view: latency, processor, memory, and what was lost.
 
 Simulated recordings are played in real time through the three node processes. A frame's end-to-end latency is from the
-arrival of its image to the registrar's acknowledgement for it; that of a frame that completed a keyframe includes the
-whole search for loops. A constraint's latency is from the arrival of the image that it is about: until its keyframe is
-complete (a second at most), searched for and published. The counters say what every node dropped and why: in = out +
-dropped.
+arrival of its image until a node is done with it, the registrar until the camera is followed to it; what the search of
+a keyframe takes after that is `search_ms`. A constraint's latency is from the arrival of the image that it is about:
+until its keyframe is complete (a second at most), searched for and published. Those that came with the search of their
+own keyframe are `at_once`: `keyframe` of that the keyframe took to be complete. Others were held for the `proof` of
+the camera, which is over with the first constraint, or waited for `others` to confirm them. The counters say what every
+node dropped and why: in = out + dropped.
 
     python benchmarks/latency.py --json latency.json
+    python benchmarks/latency.py --objects 4 --seconds 40     long enough for constraints after the proof
     python benchmarks/latency.py --objects 4 --composed 3     three processes and one in turn, three times each
 """
 
@@ -33,6 +36,7 @@ from objreg_tools.simulation.write import write_plan
 
 PROGRAMS = {**{room: f"objreg_ros.{room}.node" for room in STAGES}, "graph": "objreg_tools.graph"}
 TICKS = os.sysconf("SC_CLK_TCK")
+ORDER_S = 0.02  # messages of two topics that were sent in this order may come in the other
 
 
 class Witness:
@@ -51,6 +55,7 @@ class Witness:
 
         self.seen: dict[int, float] = {}
         self.done: dict[tuple[str, int], float] = {}
+        self.searched: dict[int, float] = {}  # of each frame that completed a keyframe, when its search was over
         self.told: list[tuple[int, float]] = []  # of each constraint the image that it is about, and when
         self._stamp_ns = stamp_ns
         self._context = Context()
@@ -69,8 +74,11 @@ class Witness:
 
     def _finish(self, acknowledgement: Any) -> None:
         node, verdict, *_ = acknowledgement.frame_id.split(" ")
-        if verdict == "published":
-            self.done[node, self._stamp_ns(acknowledgement)] = time.monotonic()
+        frame, now = (node, self._stamp_ns(acknowledgement)), time.monotonic()
+        if verdict == "published" and frame in self.done:
+            self.searched[frame[1]] = now
+        elif verdict in ("followed", "published"):
+            self.done[frame] = now
 
     def _receive(self, constraint: Any) -> None:
         self.told.append((self._stamp_ns(constraint), time.monotonic()))
@@ -92,16 +100,31 @@ class Witness:
         """p50 and p95 from the image to the node's acknowledgement, and of how many frames."""
         return self._latency_ms([(stamp, at) for (name, stamp), at in self.done.items() if name == node])
 
-    def constraint_ms(self) -> dict[str, float]:
-        """The same to the constraints about an image."""
-        return self._latency_ms(self.told)
+    def search_ms(self) -> dict[str, float]:
+        """The same from there to the end of the search, of the frames that completed a keyframe."""
+        return _figures([1e3 * (at - self.done["registrar", stamp]) for stamp, at in self.searched.items()])
+
+    def constraint_ms(self) -> dict[str, dict[str, float]]:
+        """The same to the constraints about an image: of all, and by what they waited for."""
+        kinds: dict[str, list[tuple[int, float]]] = {"at_once": [], "proof": [], "others": []}
+        first = min((at for _, at in self.told), default=np.inf)
+        for stamp, at in self.told:
+            if stamp in self.seen:
+                own = at < self._searched_at(stamp) + ORDER_S
+                kinds["at_once" if own else "proof" if self.seen[stamp] < first else "others"].append((stamp, at))
+        completed = [(stamp, self.done["registrar", self._completing(stamp)]) for stamp, _ in kinds["at_once"]]
+        apart = {name: self._latency_ms(ends) for name, ends in kinds.items()}
+        return {"all": self._latency_ms(self.told), **apart, "keyframe": self._latency_ms(completed)}
+
+    def _completing(self, stamp_ns: int) -> int:
+        """The frame that completed the keyframe which an image is of; 0 for none."""
+        return min((stamp for stamp in self.searched if stamp >= stamp_ns), default=0)
+
+    def _searched_at(self, stamp_ns: int) -> float:
+        return self.searched.get(self._completing(stamp_ns), -np.inf)
 
     def _latency_ms(self, ends: Sequence[tuple[int, float]]) -> dict[str, float]:
-        times = [1e3 * (at - self.seen[stamp]) for stamp, at in ends if stamp in self.seen]
-        if not times:
-            return {"frames": 0.0}
-        p50, p95 = np.percentile(times, (50, 95))
-        return {"frames": float(len(times)), "p50": round(float(p50), 2), "p95": round(float(p95), 2)}
+        return _figures([1e3 * (at - self.seen[stamp]) for stamp, at in ends if stamp in self.seen])
 
     def close(self) -> None:
         """End the node."""
@@ -109,6 +132,13 @@ class Witness:
         self._thread.join(5.0)
         self._node.destroy_node()
         self._context.try_shutdown()
+
+
+def _figures(times: Sequence[float]) -> dict[str, float]:
+    if not times:
+        return {"frames": 0.0}
+    p50, p95 = np.percentile(times, (50, 95))
+    return {"frames": float(len(times)), "p50": round(float(p50), 2), "p95": round(float(p95), 2)}
 
 
 class Meter:
@@ -211,10 +241,11 @@ def measure(path: Path, setup: Setup) -> dict[str, Any]:
             live = run_live(path, setup, Path(logs), lambda words: click.echo(words, err=True))
             usage = meter.figures(*witness.span)
             latency = {node: witness.latency_ms(node) for node in STAGES}
-            told = witness.constraint_ms()
+            told, search = witness.constraint_ms(), witness.search_ms()
         finally:
             witness.close()
-        return {"end_to_end_ms": latency, "constraint_ms": told, "books": books_of(live), "usage": usage}
+        figures = {"end_to_end_ms": latency, "search_ms": search, "constraint_ms": told}
+        return {**figures, "books": books_of(live), "usage": usage}
 
 
 def totals(usage: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
@@ -227,7 +258,7 @@ def line_of(row: Mapping[str, Any]) -> str:
     """One run in a line."""
     end_to_end, told = row["end_to_end_ms"]["registrar"], row["constraint_ms"]
     usage = f"usage {row['usage']}, together {totals(row['usage'])}"
-    return f"end to end {end_to_end}, constraints {told}, {usage}"
+    return f"end to end {end_to_end}, search {row['search_ms']}, constraints {told}, {usage}"
 
 
 def compare(path: Path, node_args: Mapping[str, list[str]], rounds: int) -> dict[str, Any]:
@@ -237,26 +268,26 @@ def compare(path: Path, node_args: Mapping[str, list[str]], rounds: int) -> dict
         for name, found in runs.items():
             found.append(measure(path, Setup(node_args=node_args, composed=name == "one")))
             click.echo(f"{name}: {line_of(found[-1])}")
-    pairs = [(_figures(one), _figures(three)) for one, three in zip(runs["one"], runs["three"], strict=True)]
+    pairs = [(_compared(one), _compared(three)) for one, three in zip(runs["one"], runs["three"], strict=True)]
     ratios = {name: [round(one[name] / three[name], 3) for one, three in pairs] for name in pairs[0][0]}
     return {**runs, "ratios": ratios, "median": {name: float(np.median(found)) for name, found in ratios.items()}}
 
 
-def _figures(row: Mapping[str, Any]) -> dict[str, float]:
+def _compared(row: Mapping[str, Any]) -> dict[str, float]:
     end_to_end = row["end_to_end_ms"]["registrar"]
     return {**totals(row["usage"]), "p50_ms": end_to_end["p50"], "p95_ms": end_to_end["p95"]}
 
 
 @click.command()
 @click.option("--objects", default="1,4,8", show_default=True, help="Objects in view, one run each.")
-@click.option("--frames", default=300, show_default=True, help="Frames of a run, at 30 a second.")
+@click.option("--seconds", default=10.0, show_default=True, help="Length of a run, at 30 frames a second.")
 @click.option("--seed", default=0, show_default=True, help="Seed of the simulated recordings.")
 @click.option("--model", default="", help="ONNX model of the detector, if not the default.")
 @click.option("--max-rate", type=float, help="The detector's max_rate, if not the default.")
 @click.option("--composed", default=0, help="Compare so many runs in three processes and in one, in turn.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 def main(
-    objects: str, frames: int, seed: int, model: str, max_rate: float | None, composed: int, json_file: Path | None
+    objects: str, seconds: float, seed: int, model: str, max_rate: float | None, composed: int, json_file: Path | None
 ) -> None:
     """Measure the live graph's latency."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(random.randint(1, 100)))  # the witness listens there too
@@ -266,7 +297,7 @@ def main(
     node_args = {"detector": words} if words else {}
     rows = {}
     for count in (int(text) for text in objects.split(",")):
-        with recorded(count, frames, seed) as path:
+        with recorded(count, round(RATE_HZ * seconds), seed) as path:
             if composed:
                 rows[str(count)] = compare(path, node_args, composed)
                 click.echo(f"{count} objects, one process over three: {rows[str(count)]['median']}")

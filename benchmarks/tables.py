@@ -13,6 +13,7 @@ from objreg_tools.simulation.world.rooms import TABLE_CLASSES
 from objreg_tools.simulation.world.scene import furnished, number, spread
 
 RATE_HZ = 30.0
+PASS = 300  # frames to and fro; a longer story goes so again and again
 
 
 def table_story(objects: int, frames: int, seed: int) -> RecordingPlan:
@@ -23,6 +24,7 @@ def table_story(objects: int, frames: int, seed: int) -> RecordingPlan:
     laid = spread(rng, sorted(models, key=lambda model: -model.radius), table.boards[0], 0.03)
     scene = furnished(rng, [(table, np.eye(4))], room).with_objects(number(laid))
     centre = np.array([0.0, 0.0, table.boards[0][2] + 0.05])
-    way = [point for start, stop in ((-40, 40), (40, -40)) for point in around(centre, 1.3, 0.7, start, stop)]
+    once = [point for start, stop in ((-40, 40), (40, -40)) for point in around(centre, 1.3, 0.7, start, stop)]
+    way = once * max(1, round(frames / PASS))
     poses, rate = carried(way, frames, RATE_HZ, rng, Hand())
     return RecordingPlan((scene,), np.zeros(frames, int), poses, rate)
