@@ -39,11 +39,15 @@ class Live:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How the graph is started: ROS arguments of each node, the player's options, and whether in one process."""
+    """How the graph is started: ROS arguments of each node, the player's options, and whether in one process.
+
+    ``programs`` has the module, and the arguments before all others, of a process that is started by another one.
+    """
 
     node_args: Mapping[str, Sequence[str]] = field(default_factory=dict)
     replay_args: Sequence[str] = ()
     composed: bool = False
+    programs: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
 def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], None]) -> Live:
@@ -51,7 +55,8 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
     environment = private_environment()
     with Processes(folder, environment) as processes, _listening(environment) as collector:
         for name, module, arguments in _programs(setup):
-            processes.start(name, module, arguments, quiet=not is_verbose())
+            started, *before = setup.programs.get(name, (module,))
+            processes.start(name, started, [*before, *arguments], quiet=not is_verbose())
         say("starting three nodes")
         _wait_for_nodes(collector, processes)
         say("playing")
