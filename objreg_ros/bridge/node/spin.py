@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Sequence
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 
 from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.process import profile, shared_memory
@@ -20,6 +19,7 @@ from objreg_ros.bridge.process.lifetime import (
     share_arenas,
     shutdown_as_interrupt,
 )
+from objreg_ros.bridge.process.sparing_executor import SparingExecutor
 from objreg_ros.terminal import protect_terminal
 
 
@@ -61,7 +61,7 @@ def _refuse(error: Exception) -> int:
 
 
 def _serve(makes: Sequence[Callable[[], NodeBase]], transport: str, first_signal: FirstSignal) -> int:
-    executor, nodes = SingleThreadedExecutor(), list[NodeBase]()
+    executor, nodes = SparingExecutor(), list[NodeBase]()
     try:
         try:
             refused = _make(makes, nodes)
@@ -87,7 +87,7 @@ def _make(makes: Sequence[Callable[[], NodeBase]], nodes: list[NodeBase]) -> Exc
     return None
 
 
-def _spin(nodes: Sequence[NodeBase], executor: SingleThreadedExecutor, transport: str) -> None:
+def _spin(nodes: Sequence[NodeBase], executor: SparingExecutor, transport: str) -> None:
     """Until a signal, or until a managed node was shut down; what ended a worker is raised."""
     try:
         with shutdown_as_interrupt():
