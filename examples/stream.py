@@ -13,7 +13,7 @@ RATE = 2  # frames in a second of a slow camera
 def main() -> None:
     """Go there and back again without odometry, and print what the registrar closes and refuses."""
     plan = make_plan("orbit", seed=7, frames=120)
-    registrar = Registrar(RegistrarParams(store=""))  # in memory; a file name remembers over restarts
+    registrar = Registrar(RegistrarParams(store=""))  # a temporary file; a file name remembers over restarts
     there = list(range(0, 25, 4))
     for n, k in enumerate(there + there[::-1]):
         seen = render(plan.scenes[int(plan.scene_of[k])], plan.T_world_camera[k], seed=n, threads=2)

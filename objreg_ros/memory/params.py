@@ -13,7 +13,7 @@ from objreg_ros.registration.params import RegistrationParams
 class MemoryParams(RegistrationParams):
     """What is stored, and which stored keyframes a new one is compared with."""
 
-    store: str = param("", "the SQLite file that remembers; empty: memory only, forgotten at the end", at_start=True)
+    store: str = param("", "the SQLite file that remembers; empty: a temporary one, gone at the end", at_start=True)
     max_views: int = param(8, "views of one object that are kept, the most diverse", ge=1)
     max_keyframes: int = param(20000, "most keyframes that are kept; the oldest go first", ge=1)
     max_megabytes: float = param(10000.0, "largest store; the oldest keyframes go first", "MB", ge=1.0)

@@ -5,7 +5,8 @@ What `Store.write_keyframe` has returned from is on the disk: the file is in WAL
 and a keyframe with its objects and closures is one transaction, so a process that is killed at any time leaves whole
 keyframes. The log is folded into the file after each of them, so that nothing hangs on the log alone. What is read was
 written: every row has a checksum of all its columns, and the `counters` say how many there are. Memory is bounded: only
-the last keyframes that were used stay decoded. So is the file: free space goes back to the disk.
+the last keyframes that were used stay decoded, also where no file is named: a temporary one has the rest. So is the
+file: free space goes back to the disk.
 """
 
 from __future__ import annotations
@@ -28,16 +29,15 @@ from objreg_ros.memory.migration import opened
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store_file import (
     STEP,
-    bear,
     bytes_in_use,
     bytes_of,
-    connect,
     copy,
     create,
     dated_link,
     fold_log,
     require_place,
     shrink,
+    temporary,
 )
 from objreg_ros.memory.transaction import SESSION, delete, rename_landmarks, write_closures, write_keyframe
 from objreg_ros.registration.keyframe import Keyframe
@@ -54,7 +54,7 @@ HEAD = ("id", "session", "stamp_ns", "robot", "origin", "travelled", "by_odometr
 
 
 class Store:
-    """The store at ``path``, made if it is not there; in memory only if the path is empty. StoreError if it is bad.
+    """The store at ``path``, made if it is not there; a temporary one if that is empty. StoreError if it is bad.
 
     A store that is written is this one's alone until `close` (see `Claim`). With ``read_only`` nothing is made or
     changed, whoever writes it, and a path without a store is a StoreError too. Whatever the file refuses later (a full
@@ -68,8 +68,7 @@ class Store:
         self._counters = Counters()
         self._claim: Claim | None = None
         if not self.path and not read_only:
-            self._connection = connect(":memory:")
-            bear(self._connection)
+            self._connection = temporary()
             return
         with self._reporting("open", LEFT), ExitStack() as undo:
             require_place(Path(self.path), read_only)
@@ -259,14 +258,14 @@ class Store:
     def save(self, path: str | Path = "") -> str:
         """Fold the write-ahead log into the file, or write a whole copy to ``path``. Returns where it is.
 
-        StoreError where that cannot be: a store in memory has no file, and a log that others read stays.
+        StoreError where that cannot be: a temporary store keeps no file, and a log that others read stays.
         """
         with self._reporting(f"copy it to {path}" if path else "save it"):
             if path:
                 copy(self._connection, Path(path).expanduser())
                 return str(path)
             if not self.path:
-                raise ValueError("expected a store in a file, got one in memory only; start with a path for it")
+                raise ValueError("expected a store in a file, got a temporary one; start with a path for it")
             shrink(self._connection)
             fold_log(self._connection, Path(self.path).name)
             return self.path
@@ -288,4 +287,4 @@ class Store:
             raise
         except (sqlite3.Error, ValueError, OverflowError, OSError) as error:
             why = " ".join(str(error).split())
-            raise StoreError(f"{self.path or 'memory'}: cannot {what}: {why}{advice}") from error
+            raise StoreError(f"{self.path or 'temporary store'}: cannot {what}: {why}{advice}") from error

@@ -18,6 +18,7 @@ APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
 SCHEMA_VERSION = 7  # at byte 60
 OLDEST_VERSION = 5  # that of the first release
 SPARE = 2048  # pages of 4 kB that may lie free in the file: what comes next takes them
+CACHE_KB = 4096  # of the pages of a temporary store: some keyframes; a store of a few objects is never written
 STEP = 4096  # pages that are given back at once: 16 MB, so that no keyframe waits long
 PAGES = "page_count", "freelist_count", "page_size"
 BYTES = """SELECT (SELECT LENGTH(view) + LENGTH(context) FROM scene WHERE id = ?)
@@ -214,6 +215,20 @@ def _foreign(connection: sqlite3.Connection) -> str:
 
 def _parts(connection: sqlite3.Connection) -> set[tuple[object, ...]]:
     return {tuple(row) for row in connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master")}
+
+
+def temporary() -> sqlite3.Connection:
+    """An empty store that is gone when it is closed, and when the process is killed.
+
+    SQLite keeps `CACHE_KB` of it in memory and the rest in a file without a name, in the first folder of SQLITE_TMPDIR,
+    TMPDIR, /var/tmp and /tmp that can be written. An hour of new places is gigabytes: no robot has so much memory.
+    """
+    connection = connect("")
+    connection.execute("PRAGMA temp_store = FILE")
+    connection.execute(f"PRAGMA cache_size = -{CACHE_KB}")
+    connection.execute("PRAGMA journal_mode = MEMORY")  # what a failed keyframe changed is undone from there
+    bear(connection)
+    return connection
 
 
 def connect(path: str) -> sqlite3.Connection:

@@ -306,7 +306,7 @@ class Registrar:
 
     def save(self, path: str = "") -> str:
         """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is.
-        StoreError where that cannot be, and without ``path`` where the store is in memory only.
+        StoreError where that cannot be, and without ``path`` where the store is a temporary one.
         """
         with self._lock:
             return self._store.save(path)

@@ -28,6 +28,7 @@ from objreg_ros.memory.counters import MOST_IDS
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.store_file import CACHE_KB
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 
@@ -66,7 +67,7 @@ def test_a_keyframe_comes_back_as_it_went_in(tmp_path: Path) -> None:
     assert np.array_equal(back.T_odom_camera, np.eye(4)) and np.array_equal(back.gravity, (0, 1, 0))
 
 
-def test_a_store_in_memory_needs_no_file() -> None:
+def test_a_temporary_store_needs_no_file() -> None:
     store = Store()
     number = _add(store)
     assert store.keyframe(number).labels == ("cup",) and store.counts()["objects"] == 1
@@ -222,17 +223,17 @@ def test_clearing_forgets_all_but_the_ids() -> None:
     assert set(store.counts().values()) == {0} and store.next_keyframe() == 2
 
 
-def test_a_copy_can_be_saved_from_memory(tmp_path: Path) -> None:
+def test_a_copy_of_a_temporary_store_can_be_saved(tmp_path: Path) -> None:
     store = Store()
     _add(store)
     store.save(tmp_path / "copy.db")
     assert Store(tmp_path / "copy.db").counts()["keyframes"] == 1
 
 
-def test_a_store_in_memory_is_not_saved_without_a_path() -> None:
+def test_a_temporary_store_is_not_saved_without_a_path() -> None:
     store = Store()
     _add(store)
-    with pytest.raises(StoreError, match="memory: cannot save it: expected a store in a file, got one in memory only"):
+    with pytest.raises(StoreError, match=r"temporary store: cannot save it: .* got a temporary one"):
         store.save()
 
 
@@ -674,3 +675,18 @@ def test_a_late_closure_is_written_and_renames_the_landmarks_that_it_joins(tmp_p
     again = Store(tmp_path / "place.db")
     assert [closure.from_ns for closure in again.closures()] == [1] and again.counts()["closures"] == 1
     assert {sighting.landmark for sighting in again.sightings()} == {1}
+
+
+def test_a_temporary_store_keeps_keyframes_on_the_disk_and_reads_back_what_was_put_in() -> None:
+    store = Store()
+    store._recent.most_bytes = 1
+    assert store._connection.execute("PRAGMA database_list").fetchone()["file"] == ""
+    assert store._connection.execute("PRAGMA cache_size").fetchone()[0] == -CACHE_KB
+    written = keyframe(1)
+    store.write_keyframe(written, sightings_of(written))
+    for _ in range(3):
+        _add(store)
+    back = store.keyframe(1)
+    assert back is not written and back.labels == written.labels
+    assert np.array_equal(back.objects[0].cloud.xyz, written.objects[0].cloud.xyz)
+    assert np.allclose(back.view.xyz, written.view.xyz, atol=1e-5)

@@ -111,7 +111,7 @@ def test_a_disabled_registrar_drops_its_frames_as_disabled_until_it_is_enabled(
 
 def test_the_registrar_ends_its_keyframe_to_save_and_forgets_on_demand(running: Graph) -> None:
     saved, why = call(running, Trigger, "registrar/save")
-    assert not saved and "got one in memory only" in why
+    assert not saved and "got a temporary one" in why
     running.wait_for(lambda: bool(running.received["landmarks"]), what="the objects of the keyframe that was saved")
     assert all((table(message, "object_id")["object_id"] >= 1).all() for message in running.received["landmarks"])
     running.wait_for(lambda: bool(running.received["refusals"]), what="why the two runs of the clock are not tied")
