@@ -22,7 +22,8 @@ from objreg_ros.registration.certainty.observability import DOUBTFUL_SIGMA_M, be
 from objreg_ros.registration.kernels.same_pose import AGREEING, near
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrationParams
-from objreg_ros.registration.prepare.prepared import Pair, PreparedCache
+from objreg_ros.registration.prepare.prepared import Pair
+from objreg_ros.registration.prepare.prepared_cache import PreparedCache
 from objreg_ros.registration.propose.competing_hypotheses import competing_poses
 from objreg_ros.registration.propose.evidence import (
     CONSIDERED_MARGIN,

@@ -22,7 +22,8 @@ from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import merged
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrationParams
-from objreg_ros.registration.prepare.prepared import Prepared, PreparedCache
+from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.prepare.prepared_cache import PreparedCache
 from objreg_ros.registration.propose.evidence import gather, perturbation_margin_of
 
 PAIR_DISTANCE_M = 0.1  # pairs of points farther apart are rejected

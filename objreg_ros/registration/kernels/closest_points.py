@@ -12,11 +12,15 @@ from objreg_ros.native import kernels
 
 _KERNELS = kernels("closest_points")
 MOST_CELLS = 4_000_000
+NO_POINT = 65535  # in a cell that no point is near; two bytes a cell, since grids are most of a prepared keyframe
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class IndexedSurface:
-    """Oriented points (N, 3) float32 with a grid that holds, in each cell, which of them is closest (-1: none near)."""
+    """Oriented points (N, 3) float32 with a grid that holds, in each cell, which of them is closest.
+
+    N is at most `NO_POINT`, which is what a cell holds that none is near.
+    """
 
     xyz: Array
     normals: Array
@@ -34,11 +38,16 @@ class IndexedSurface:
 
 
 def prepare_surface(xyz: Array, normals: Array, cell: float, reach: float) -> IndexedSurface:
-    """A surface whose grid knows the closest point out to ``reach`` m; ``cell`` m grows for a very large cloud."""
-    usable = np.abs(normals).sum(axis=1) > 0.5
+    """A surface whose grid knows the closest point out to ``reach`` m; ``cell`` m grows for a very large cloud.
+
+    Of more than `NO_POINT` points it keeps so many, evenly.
+    """
+    usable = np.flatnonzero(np.abs(normals).sum(axis=1) > 0.5)
+    if len(usable) > NO_POINT:
+        usable = usable[np.linspace(0, len(usable) - 1, NO_POINT).astype(np.int64)]
     xyz, normals = np.ascontiguousarray(xyz[usable], np.float32), np.ascontiguousarray(normals[usable], np.float32)
     if len(xyz) == 0:
-        nothing = np.full((1, 1, 1), -1, np.int32)
+        nothing = np.full((1, 1, 1), NO_POINT, np.uint16)
         return IndexedSurface(xyz=xyz, normals=normals, closest=nothing, low=np.zeros(3, np.float32), cell=cell)
     low, size = xyz.min(axis=0) - reach, np.ptp(xyz, axis=0) + 2.0 * reach
     while np.prod(size / cell + 1.0) > MOST_CELLS:

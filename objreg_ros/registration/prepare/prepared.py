@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -36,7 +34,6 @@ OBJECT_VOXEL_M = 0.012  # distance of the points of objects, which are aligned t
 OBJECT_POINTS = 400  # most of all objects that are aligned: as many as of the surface about them
 GRID_CELL_M = 0.05  # of the grid that knows the closest point
 GRID_REACH_M = 0.2  # how far from a surface its grid reaches: as far as ICP looks at first
-PREPARED = 64  # keyframes that are kept ready: as many as the store keeps decoded; about 6 MB each
 
 Made = TypeVar("Made")
 
@@ -53,6 +50,11 @@ class AtNeed(Sequence[Made]):
 
     def __len__(self) -> int:
         return self._count
+
+    @property
+    def made(self) -> list[Made]:
+        """The items that were made until now."""
+        return list(self._made.values())
 
     @overload
     def __getitem__(self, index: int) -> Made: ...
@@ -208,26 +210,3 @@ def _shuffled(xyz: Array, normals: Array, seed: int) -> dict[str, Array]:
     """The points that have a normal, in a fixed random order: the first n are a fair sample."""
     order = np.random.default_rng(seed).permutation(np.flatnonzero(normals.any(axis=1)))
     return {"xyz": np.ascontiguousarray(xyz[order]), "normals": np.ascontiguousarray(normals[order])}
-
-
-class PreparedCache:
-    """The last ``size`` keyframes that were made ready; for several threads."""
-
-    def __init__(self, params: RegistrationParams, size: int = PREPARED) -> None:
-        self._params = params
-        self._size = size
-        self._lock = threading.Lock()
-        self._entries: OrderedDict[int, Prepared] = OrderedDict()
-
-    def get(self, keyframe: Keyframe) -> Prepared:
-        """The keyframe made ready, now or before; the entry holds it, so its id stays its own."""
-        with self._lock:
-            prepared = self._entries.get(id(keyframe))
-        if prepared is None:
-            prepared = prepare(keyframe, self._params)
-        with self._lock:
-            self._entries[id(keyframe)] = prepared
-            self._entries.move_to_end(id(keyframe))
-            while len(self._entries) > self._size:
-                self._entries.popitem(last=False)
-        return prepared

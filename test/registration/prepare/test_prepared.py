@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registration.prepare.prepared import AtNeed, PreparedCache, prepare
+from objreg_ros.registration.prepare.prepared import AtNeed, prepare
 from registration.rooms import keyframe, seen_from
 
 PARAMS = RegistrarParams()
@@ -49,13 +49,3 @@ def test_without_gravity_nothing_is_upright() -> None:
     ready = prepare(keyframe(seen_from(0.0), gravity=False), PARAMS)
     assert ready.up is None and ready.scene is None
     assert set(ready.shapes) == {None} and not any(ready.yaw_known)
-
-
-def test_the_pantry_makes_a_keyframe_ready_once_and_lets_go_of_the_one_that_was_asked_for_longest_ago() -> None:
-    pantry = PreparedCache(PARAMS, size=2)
-    views = [keyframe(seen_from(angle)) for angle in (0.0, 10.0, 20.0)]
-    first, second = (pantry.get(view) for view in views[:2])
-    assert pantry.get(views[0]) is first
-    pantry.get(views[2])
-    assert pantry.get(views[0]) is first
-    assert pantry.get(views[1]) is not second

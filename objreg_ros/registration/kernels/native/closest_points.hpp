@@ -4,23 +4,25 @@
 #include "objreg_ros/native/binding.hpp"
 
 namespace objreg::closest_points {
+constexpr u16 NO_POINT = 65535;  // of a cell that no point is near: NO_POINT in closest_points.py
+
 // Give a cell to a point if it is closer to its middle than the cell's own; whether it is.
-inline bool claims(i32 i, View<const float, 2> places, i64 a, i64 b, i64 c, View<i32, 3> closest,
+inline bool claims(i32 i, View<const float, 2> places, i64 a, i64 b, i64 c, View<u16, 3> closest,
                    View<float, 3> distance) {
   const float x = static_cast<float>(a) - places(i, 0), y = static_cast<float>(b) - places(i, 1);
   const float z = static_cast<float>(c) - places(i, 2), d = x * x + y * y + z * z;
   if (i == closest(a, b, c) || !(d < distance(a, b, c))) return false;
-  closest(a, b, c) = i, distance(a, b, c) = d;
+  closest(a, b, c) = static_cast<u16>(i), distance(a, b, c) = d;
   return true;
 }
 
 // The grid, a cell of which knows the closest point. Every point claims its cell and those next to it, and from there
 // cells hand it on: a cell that got a closer point hands it to its six neighbours, as far as `reach` goes. Where many
 // points are about as close that is not always the closest, but one next to it.
-inline Array<i32, 3> closest(View<const float, 2> xyz, View<const float, 1> low, float cell, View<const i64, 1> shape,
+inline Array<u16, 3> closest(View<const float, 2> xyz, View<const float, 1> low, float cell, View<const i64, 1> shape,
                              float reach) {
   const i64 size[3] = {shape(0), shape(1), shape(2)}, cells = size[0] * size[1] * size[2];
-  auto closest = full<i32, 3>(-1, size[0], size[1], size[2]);
+  auto closest = full<u16, 3>(NO_POINT, size[0], size[1], size[2]);
   auto distance = full<float, 3>((reach / cell) * (reach / cell), size[0], size[1], size[2]);
   auto waiting = zeros<bool, 3>(size[0], size[1], size[2]);
   Array<float, 2> places(xyz.size(), 3);  // in cells, from the middle of the first

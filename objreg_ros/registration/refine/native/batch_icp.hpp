@@ -2,6 +2,7 @@
 // The kernels of batch_icp.py.
 #pragma once
 #include "objreg_ros/native/binding.hpp"
+#include "objreg_ros/registration/kernels/native/closest_points.hpp"
 #include "objreg_ros/registration/kernels/native/least_squares.hpp"
 #include "objreg_ros/registration/kernels/native/projection.hpp"
 
@@ -10,12 +11,12 @@ constexpr double FACING = 0.6;  // cosine between the normals of a pair, at leas
 
 struct Surface {
   View<const float, 2> xyz, normals;
-  View<const i32, 3> closest;
+  View<const u16, 3> closest;
   View<const float, 1> low;
   double cell;
 };
 // `IndexedSurface.grid`
-using Grid = std::tuple<View<const float, 2>, View<const float, 2>, View<const i32, 3>, View<const float, 1>, double>;
+using Grid = std::tuple<View<const float, 2>, View<const float, 2>, View<const u16, 3>, View<const float, 1>, double>;
 inline Surface surface_of(const Grid &grid) {
   return std::apply([](auto... part) { return Surface{part...}; }, grid);
 }
@@ -46,9 +47,10 @@ inline Partners partners(View<const double, 1> x, View<const double, 1> y, View<
       cs[k] = static_cast<i32>(in ? c : 0.0);
     }
     for (i64 k = 0; k < size; k++) {
-      const i32 j = to.closest(as[k], bs[k], cs[k]);  // of the first cell, for a place that is in none
-      met(n) = static_cast<u32>(first + k), partner(n) = static_cast<u32>(std::max(j, 0));
-      n += inside[k] & (j >= 0);
+      const u16 j = to.closest(as[k], bs[k], cs[k]);  // of the first cell, for a place that is in none
+      const bool known = j != closest_points::NO_POINT;
+      met(n) = static_cast<u32>(first + k), partner(n) = known ? j : 0u;
+      n += inside[k] & known;
     }
   }
   return {std::move(met).first(n), std::move(partner).first(n)};
@@ -133,7 +135,7 @@ inline std::tuple<Array<double, 1>, Array<double, 1>> align(View<const float, 2>
 // `pair` and `normal_equations` for Python.
 inline std::tuple<Array<u32, 1>, Array<double, 2>, Array<double, 2>, Array<double, 1>, Array<double, 1>> pair_with(
     View<const float, 2> P, View<const float, 2> N, View<const float, 2> Q, View<const float, 2> M,
-    View<const i32, 3> closest, View<const float, 1> low, double cell, View<const double, 2> T, double reach) {
+    View<const u16, 3> closest, View<const float, 1> low, double cell, View<const double, 2> T, double reach) {
   Pairs made = pair(P, N, Surface{Q, M, closest, low, cell}, T, reach);
   return {std::move(made.index), std::move(made.at), std::move(made.J), std::move(made.residual),
           std::move(made.weight)};

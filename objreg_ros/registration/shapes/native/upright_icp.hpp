@@ -2,6 +2,7 @@
 // The kernels of upright_icp.py.
 #pragma once
 #include "objreg_ros/native/binding.hpp"
+#include "objreg_ros/registration/kernels/native/closest_points.hpp"
 #include "objreg_ros/registration/kernels/native/least_squares.hpp"
 
 namespace objreg::upright_icp {
@@ -10,7 +11,7 @@ constexpr double LARGEST_TURN = 0.3;  // rad in one step
 constexpr double POINTWISE = 0.005;   // weight of point-to-point error beside it: holds what slides along a plane
 
 // `IndexedSurface.grid`: xyz, normals, closest, low and cell.
-using Grid = std::tuple<View<const float, 2>, View<const float, 2>, View<const i32, 3>, View<const float, 1>, double>;
+using Grid = std::tuple<View<const float, 2>, View<const float, 2>, View<const u16, 3>, View<const float, 1>, double>;
 
 // Move `motion (yaw, x, y, rise)` in place, but for its rise, to the surface; returns how many pairs it found. Pairs
 // lie within `reach` m at first and `last_reach` at last.
@@ -35,8 +36,8 @@ inline i64 settled(View<const float, 2> P, View<const float, 2> N, i64 most, con
       const double x = rx + shift_x, y = ry + shift_y, z = P(i, 2) + rise;
       const double a = (x - low_x) * scale, b = (y - low_y) * scale, e = (z - low_z) * scale;
       if (!((a >= 0.0) & (b >= 0.0) & (e >= 0.0) & (a < columns) & (b < rows) & (e < layers))) continue;
-      const i64 j = closest(static_cast<i64>(a), static_cast<i64>(b), static_cast<i64>(e));
-      if (j < 0) continue;
+      const u16 j = closest(static_cast<i64>(a), static_cast<i64>(b), static_cast<i64>(e));
+      if (j == closest_points::NO_POINT) continue;
       const float mx = M(j, 0), my = M(j, 1), mz = M(j, 2);
       if ((c * N(i, 0) - s * N(i, 1)) * mx + (s * N(i, 0) + c * N(i, 1)) * my + N(i, 2) * mz < COMPATIBLE) continue;
       const double dx = x - Q(j, 0), dy = y - Q(j, 1), dz = z - Q(j, 2);
