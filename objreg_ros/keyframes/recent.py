@@ -7,7 +7,7 @@ from collections import OrderedDict
 
 from objreg_ros.registration.keyframe import Keyframe
 
-MOST_BYTES = 64_000_000  # of about 500 kB a keyframe
+MOST_BYTES = 32_000_000  # of about 500 kB a keyframe; one that is read again takes a millisecond
 
 
 class RecentKeyframes:
