@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import find_objects
 
 from objreg_ros import limits
 from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers
@@ -120,6 +119,8 @@ def instances(numbers: Array, names: Mapping[int, str], stamp_ns: int, frame_id:
 
     An instance without a name is `UNNAMED`: its number gives no class. A mask has no score of its own, so 1 is taken.
     """
+    from scipy.ndimage import find_objects  # 28 MB, that a node without masks is spared
+
     places = {number: place for number, place in enumerate(find_objects(numbers), start=1) if place is not None}
     if len(places) > limits.MOST_DETECTIONS:
         raise ValueError(f"masks: expected at most {limits.MOST_DETECTIONS} instances, got {len(places)}")
