@@ -41,7 +41,7 @@ EXTRAS = {  # module: the extra that brings it, and what for
     "rerun": ("rerun", "recordings for the Rerun viewer"),
 }
 LEAST_DISK_BYTES = 1 << 29
-LEAST_SHARED_BYTES = 1 << 28  # four processes with the 64 MiB of config/fastdds.xml
+LEAST_SHARED_BYTES = 1 << 28  # three nodes, and three drivers with the 64 MiB of config/fastdds.xml
 SHARED_MEMORY = Path("/dev/shm")
 
 

@@ -38,7 +38,7 @@ def run_together(makes: Sequence[Callable[[], NodeBase]], args: Sequence[str] | 
     protect_terminal()
     first_signal = receive_first_signal()
     share_arenas()
-    transport = profile.apply()
+    transport = profile.apply(ours=profile.NODE)
     shared_memory.free_abandoned()
     try:
         begin(args)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shared memory of Fast DDS whose process was killed: 64 MiB a node with config/fastdds.xml.
+"""The shared memory of Fast DDS whose process was killed: 24 MiB a node with config/fastdds_node.xml.
 
 A process holds a lock on a file beside its segment for as long as it lives. After a kill both files stay until somebody
 removes them, which Fast DDS leaves to its own tool, `fastdds shm clean`.

@@ -23,6 +23,15 @@ def test_our_profile_is_taken_where_the_user_has_none() -> None:
     assert environment[profile.VARIABLES[0]] in line
 
 
+def test_a_node_takes_its_own_in_the_place_of_ours_that_it_inherits() -> None:
+    environment: dict[str, str] = {}
+    profile.apply(environment)
+    assert profile.NODE in profile.apply(environment, ours=profile.NODE)
+    assert {environment[name] for name in profile.VARIABLES} == {str(find(profile.NODE))}
+    own = {profile.VARIABLES[0]: "mine"}
+    assert "mine" in profile.apply(own, ours=profile.NODE) and own == {profile.VARIABLES[0]: "mine"}
+
+
 def test_it_says_the_same_in_a_process_that_inherits_it() -> None:
     environment: dict[str, str] = {}
     assert profile.apply(environment) == profile.apply(environment)
@@ -74,11 +83,13 @@ def made_with(path: Path, domain: int, mode: str = "AUTO") -> subprocess.Complet
     return subprocess.run([sys.executable, "-c", NODE], env=environment, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("name", [profile.PROFILE, profile.WIFI])
-def test_fast_dds_reads_the_profile_and_makes_what_it_says(name: str, domain: int) -> None:
+@pytest.mark.parametrize(
+    ("name", "size"), [(profile.PROFILE, 67_108_864), (profile.WIFI, 67_108_864), (profile.NODE, 25_165_824)]
+)
+def test_fast_dds_reads_the_profile_and_makes_what_it_says(name: str, size: int, domain: int) -> None:
     done = made_with(find(name), domain)
     assert done.returncode == 0 and "Error" not in done.stdout + done.stderr
-    assert int(done.stdout.split()[-1]) >= 67_108_864, "the shared memory of its own profile is 0.5 MB"
+    assert int(done.stdout.split()[-1]) >= size, "the shared memory of its own profile is 0.5 MB"
 
 
 def test_fast_dds_says_what_it_cannot_read(tmp_path: Path, domain: int) -> None:
