@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The benchmarks are scripts beside each other, no package: their tests find them by the path.
 
-One of them has the name of a folder of tests, which is put aside meanwhile.
+Some have the name of a folder of tests, which is put aside meanwhile.
 """
 
 from __future__ import annotations

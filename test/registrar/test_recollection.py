@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import replace
 from pathlib import Path
 
@@ -111,3 +112,18 @@ def test_the_oldest_goes_from_all_of_them_when_there_are_too_many() -> None:
     recollection.remember(NEW, sightings_of(NEW), ())
     assert recollection.store.keyframe_ids() == [2] and len(recollection.index) == 2
     assert [one.session for one in recollection.landmarks.known()] == [1, 1]
+
+
+def test_of_many_keyframes_only_those_used_last_are_in_memory_and_the_others_are_read_back() -> None:
+    recollection = Recollection(PARAMS, Store())
+    recollection.store._recent.most_bytes = 3 * STORED.nbytes
+    for k in range(20):
+        passing = replace(keyframe(k + 1, 10.0 * k, THINGS, session=k), robot="passing")
+        recollection.remember(passing, sightings_of(passing), ())
+    del passing
+    gc.collect()
+    alive = [one for one in gc.get_objects() if isinstance(one, Keyframe) and one.robot == "passing"]
+    assert sorted(one.keyframe_id for one in alive) == [18, 19, 20]
+    assert len(recollection.index) == 40 and len(recollection.landmarks) == 40
+    back = recollection.store.keyframe(1)
+    assert all(np.array_equal(a.cloud.xyz, b.cloud.xyz) for a, b in zip(back.objects, STORED.objects, strict=True))
