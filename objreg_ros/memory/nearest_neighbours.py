@@ -105,9 +105,14 @@ class Block:
         return found, np.maximum(0.5 * float(descriptor @ descriptor) - similarity, 0.0)
 
     def _grow(self) -> None:
-        self.where = np.concatenate([self.where, np.zeros_like(self.where)])
-        self.when = np.concatenate([self.when, np.zeros_like(self.when)])
-        self._descriptors = np.concatenate([self._descriptors, np.zeros_like(self._descriptors)])
-        self._bytes = np.concatenate([self._bytes, np.zeros_like(self._bytes)])
+        self.where, self.when = _doubled(self.where), _doubled(self.when)
+        self._descriptors, self._bytes = _doubled(self._descriptors), _doubled(self._bytes)
+        self._spans = _doubled(self._spans)
         self._half_norms = np.concatenate([self._half_norms, np.full_like(self._half_norms, NOWHERE)])
-        self._spans = np.concatenate([self._spans, np.zeros_like(self._spans)])
+
+
+def _doubled(rows: Array) -> Array:
+    """The rows with as many zeros after them, which take no memory until they are written."""
+    doubled = np.zeros((2 * len(rows), *rows.shape[1:]), rows.dtype)
+    doubled[: len(rows)] = rows
+    return doubled
