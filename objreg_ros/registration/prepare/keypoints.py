@@ -43,8 +43,11 @@ class Keypoints(NamedTuple):
         return np.asarray(self.xyz[:, 2] > 0.0)
 
 
-def find_keypoints(view: View, farthest: float) -> Keypoints:
-    """The keypoints of a view; points beyond ``farthest`` m are unknown."""
+def find_keypoints(view: View, farthest: float, normals: Array | None = None) -> Keypoints:
+    """The keypoints of a view; points beyond ``farthest`` m are unknown.
+
+    ``normals (h, w, 3)`` are the `view_normals`, computed here where not given.
+    """
     camera = view.intrinsics
     if view.grey is None:
         return Keypoints(
@@ -58,10 +61,10 @@ def find_keypoints(view: View, farthest: float) -> Keypoints:
     depth = np.where(depth < farthest, depth, 0.0)
     rays = (uv - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
     xyz = np.column_stack([rays * depth[:, None], depth])
-    normals = view_normals(view.xyz)[row, column] * (depth > 0.0)[:, None]
+    facing = (view_normals(view.xyz) if normals is None else normals)[row, column] * (depth > 0.0)[:, None]
     described = np.zeros((0, 128), np.float32) if descriptors is None else descriptors
     lengths = np.maximum(np.linalg.norm(described, axis=1, keepdims=True), 1e-9)
-    return Keypoints(rays, xyz, normals.astype(float), np.asarray(described / lengths, np.float32), camera.fx)
+    return Keypoints(rays, xyz, facing.astype(float), np.asarray(described / lengths, np.float32), camera.fx)
 
 
 class KeypointMatches(NamedTuple):

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeVar, overload
 
 import numpy as np
@@ -20,7 +21,7 @@ from objreg_ros.registration.prepare.keypoints import KeypointMatches, Keypoints
 from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, halved, own_pixels, prepare_sight
 from objreg_ros.registration.prepare.voxels import thin
-from objreg_ros.registration.shapes.shape import Shape, prepare_shape
+from objreg_ros.registration.shapes.shape import Shape, layer_around, prepare_shape
 from objreg_ros.registration.shapes.symmetry import shows_yaw
 from objreg_ros.sensor import session_gravity_sigma_deg
 
@@ -137,49 +138,53 @@ class Pair:
 def prepare(keyframe: Keyframe, params: RegistrationParams) -> Prepared:
     """Everything about one keyframe that does not depend on its partner.
 
-    Surface and features are made beside the rest: they let go of the interpreter. What is derived of single objects is
-    made when it is asked for.
+    Surface, features and keypoints are made beside the rest: they let go of the interpreter. The keypoints, which take
+    longest, are not waited for. What is derived of single objects is made when it is asked for.
     """
-    fine = thin(*seen(keyframe, params), SURFACE_VOXEL_M)
+    normals = view_normals(keyframe.view.xyz)
+    fine = thin(*seen(keyframe, normals, params), SURFACE_VOXEL_M)
     coarse = thin(*fine, FEATURE_VOXEL_M)
     points = thin(*of_objects(keyframe), OBJECT_VOXEL_M)
     groups = LabelGroups(params.label_groups)
     up = None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float)
     seeing = params.context_range, DETAIL_SIGMA_PX, params.seed
-    with ThreadPoolExecutor(1, "prepare") as beside:
-        surface = beside.submit(prepare_surface, *joined(fine, points), GRID_CELL_M, GRID_REACH_M)
-        features = beside.submit(describe, *coarse, FEATURE_RADIUS_M)
-        sight = prepare_sight(keyframe.view, *seeing)
-        objects, drawn = keyframe.objects, (params.seed, sight.noise)
-        shapes = AtNeed(len(objects), lambda i: prepare_shape(keyframe, [i], SHAPE_POINTS, *drawn))
-        return Prepared(
-            keyframe=keyframe,
-            sight=sight,
-            halves=AtNeed(1, lambda _: prepare_sight(halved(keyframe.view), *seeing)),
-            pictures=AtNeed(1, lambda _: find_keypoints(keyframe.view, params.context_range)),
-            **_shuffled(*joined(coarse, sampled(points, OBJECT_POINTS, params.seed)), params.seed),
-            up=up,
-            up_weight=keyframe.gravity_confidence,
-            up_sigma_deg=session_gravity_sigma_deg(keyframe.gravity_confidence),
-            groups=tuple(groups.of(label) for label in keyframe.labels),
-            yaw_known=AtNeed(len(objects), lambda i: shows_yaw(objects[i].cloud, up, shapes[i])),
-            shapes=shapes,
-            own=AtNeed(len(objects), lambda i: own_pixels(objects[i], sight)),
-            together=AtNeed(1, lambda _: prepare_shape(keyframe, range(len(objects)), SCENE_POINTS, *drawn)),
-            centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
-            extents=np.array([item.extent for item in keyframe.objects]),
-            middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
-            surface=surface.result(),
-            features=salient(features.result(), FEATURE_POINTS),
-        )
+    beside = ThreadPoolExecutor(1, "prepare")
+    surface = beside.submit(prepare_surface, *joined(fine, points), GRID_CELL_M, GRID_REACH_M)
+    features = beside.submit(describe, *coarse, FEATURE_RADIUS_M)
+    keypoints = beside.submit(find_keypoints, keyframe.view, params.context_range, normals)
+    beside.shutdown(wait=False)
+    sight = prepare_sight(keyframe.view, *seeing)
+    objects, drawn = keyframe.objects, (params.seed, sight.noise)
+    layers = None if up is None else AtNeed(len(objects), partial(layer_around, keyframe, up=up))
+    shapes = AtNeed(len(objects), lambda i: prepare_shape(keyframe, [i], SHAPE_POINTS, *drawn, layers))
+    return Prepared(
+        keyframe=keyframe,
+        sight=sight,
+        halves=AtNeed(1, lambda _: prepare_sight(halved(keyframe.view), *seeing)),
+        pictures=AtNeed(1, lambda _: keypoints.result()),
+        **_shuffled(*joined(coarse, sampled(points, OBJECT_POINTS, params.seed)), params.seed),
+        up=up,
+        up_weight=keyframe.gravity_confidence,
+        up_sigma_deg=session_gravity_sigma_deg(keyframe.gravity_confidence),
+        groups=tuple(groups.of(label) for label in keyframe.labels),
+        yaw_known=AtNeed(len(objects), lambda i: shows_yaw(objects[i].cloud, up, shapes[i])),
+        shapes=shapes,
+        own=AtNeed(len(objects), lambda i: own_pixels(objects[i], sight)),
+        together=AtNeed(1, lambda _: prepare_shape(keyframe, range(len(objects)), SCENE_POINTS, *drawn, layers)),
+        centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
+        extents=np.array([item.extent for item in keyframe.objects]),
+        middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
+        surface=surface.result(),
+        features=salient(features.result(), FEATURE_POINTS),
+    )
 
 
-def seen(keyframe: Keyframe, params: RegistrationParams) -> tuple[Array, Array]:
-    """Points (N, 3) and normals (N, 3) of the whole view and of the context beyond it.
+def seen(keyframe: Keyframe, normals: Array, params: RegistrationParams) -> tuple[Array, Array]:
+    """Points (N, 3) and normals (N, 3) of the whole view, whose normals (h, w, 3) are given, and of the context beyond.
 
     The whole view, not only what is near the objects: walls and furniture hold a pose that a table would let slide.
     """
-    view, normals = keyframe.view.xyz, view_normals(keyframe.view.xyz)
+    view = keyframe.view.xyz
     known = normals.any(axis=-1) & (view[..., 2] < params.context_range)
     context = keyframe.context
     return np.concatenate([view[known], context.xyz]), np.concatenate([normals[known], context.normals])

@@ -78,8 +78,9 @@ def shortlist(pair: Pair, T_target_source_prior: Array | None) -> Shortlist:
 
     ``T_target_source_prior (4, 4)`` is a pose to start from too, or None.
     """
-    of_keypoints, shapes = from_keypoints(pair), _upright(pair)
-    proposers = [*_proposed(pair, T_target_source_prior), of_keypoints]
+    shapes, proposed = _upright(pair), _proposed(pair, T_target_source_prior)
+    of_keypoints = from_keypoints(pair)  # last: they are found meanwhile
+    proposers = [*proposed, of_keypoints]
     drawn = [hypothesis for proposed in proposers for hypothesis in _drawn_best(pair, proposed)]
     hypotheses = _settled(pair, drawn + shapes) + _scored(pair, shapes)
     if not hypotheses:

@@ -74,11 +74,17 @@ class Shape:
 
 
 def prepare_shape(
-    keyframe: Keyframe, indices: Sequence[int], most: int, seed: int = 0, noise: float = 1.0
+    keyframe: Keyframe,
+    indices: Sequence[int],
+    most: int,
+    seed: int = 0,
+    noise: float = 1.0,
+    layers: Sequence[Array] | None = None,
 ) -> Shape | None:
     """The objects ``indices`` of a keyframe as one shape of at most ``most`` points.
 
-    ``noise`` is the `depth_noise` of its view. None without gravity or with too few points.
+    ``noise`` is the `depth_noise` of its view; ``layers`` are the `layer_around` each of its objects, computed here
+    where not given. None without gravity or with too few points.
     """
     clouds = [keyframe.objects[i].cloud for i in indices]
     if keyframe.gravity is None or sum(len(cloud) for cloud in clouds) < LEAST:
@@ -91,7 +97,7 @@ def prepare_shape(
         firm = (normals != 0).any(axis=1)
     if firm.sum() < LEAST:
         return None
-    R = upright_axes(standing(keyframe, indices, -np.asarray(keyframe.gravity, float)))
+    R = upright_axes(standing(keyframe, indices, -np.asarray(keyframe.gravity, float), layers))
     feet = [footing(keyframe, i, R) for i in indices]
     upright = xyz @ R.T.astype(np.float32)
     low, high = np.transpose([_rim(upright[:, axis]) for axis in (0, 1)])
@@ -132,14 +138,15 @@ def upright_axes(up: Array) -> Array:
     return np.stack([x, np.cross(up, x), up])
 
 
-def standing(keyframe: Keyframe, indices: Sequence[int], up: Array) -> Array:
+def standing(keyframe: Keyframe, indices: Sequence[int], up: Array, layers: Sequence[Array] | None = None) -> Array:
     """Up (3,) as the normal of what the objects stand on: truer than ``up``, which is the guess against gravity.
 
     The planes under several objects are parallel. ``up`` itself where too little of them is seen, or they tilt.
+    ``layers`` are the `layer_around` each object of the keyframe, computed here where not given.
     """
     R = upright_axes(up)
-    layers = [_layer(keyframe, i, R) for i in indices]
-    points = np.concatenate([np.zeros((0, 3)), *(layer for layer in layers if len(layer) >= PLANE)])
+    beneath = [layer_around(keyframe, i, up) if layers is None else layers[i] for i in indices]
+    points = np.concatenate([np.zeros((0, 3)), *(layer for layer in beneath if len(layer) >= PLANE)])
     slope = np.zeros(2)
     for thickness in THICK:
         kept = np.abs(points[:, 2] - points[:, :2] @ slope) < thickness
@@ -153,9 +160,9 @@ def standing(keyframe: Keyframe, indices: Sequence[int], up: Array) -> Array:
     return np.asarray(normal / np.linalg.norm(normal))
 
 
-def _layer(keyframe: Keyframe, index: int, R_upright_camera: Array) -> Array:
-    """Level points (N, 3) around an object at the height that it stands on, about their own middle."""
-    R = R_upright_camera.astype(np.float32)
+def layer_around(keyframe: Keyframe, index: int, up: Array) -> Array:
+    """Level points (N, 3) around an object at the height that it stands on, about their own middle, z along ``up``."""
+    R = upright_axes(up).astype(np.float32)
     points = keyframe.objects[index].cloud.xyz @ R.T
     foot = _footing(keyframe, points, R)
     middle = points.mean(axis=0)

@@ -12,6 +12,7 @@ import pytest
 from objreg_ros.data.frames import View
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.registration.prepare.keypoints import MOST, Keypoints, find_keypoints, match_keypoints
+from objreg_ros.registration.prepare.normals import view_normals
 from registration.rooms import keyframe, seen_from
 
 CAMERA = Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120)
@@ -70,3 +71,9 @@ def test_a_print_that_repeats_itself_is_not_matched() -> None:
     once = find_keypoints(wall(), 4.0)
     twice = Keypoints(*(np.concatenate([part, part]) for part in once[:4]), once.focal_px)
     assert len(match_keypoints(once, twice)) == 0 and len(match_keypoints(once, once)) == len(once)
+
+
+def test_normals_that_are_known_already_make_the_same_keypoints() -> None:
+    view = wall()
+    found, again = find_keypoints(view, 4.0), find_keypoints(view, 4.0, view_normals(view.xyz))
+    assert len(found) > 0 and found.normals.any() and np.array_equal(found.normals, again.normals)

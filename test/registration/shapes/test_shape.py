@@ -12,6 +12,7 @@ from objreg_ros.geometry import inverse, pose_error, rotation_from_vector, trans
 from objreg_ros.registration.keyframe import Context, KeyObject
 from objreg_ros.registration.shapes.shape import (
     footing,
+    layer_around,
     prepare_shape,
     standing,
     turned_half,
@@ -107,6 +108,15 @@ def test_the_same_keyframe_gives_the_same_shape() -> None:
     a, b = prepare_shape(key, [0], 400), prepare_shape(key, [0], 400)
     assert a is not None and b is not None
     assert np.array_equal(a.xyz, b.xyz) and np.array_equal(a.silhouette.depth, b.silhouette.depth)
+
+
+def test_layers_that_are_known_already_make_the_same_shape() -> None:
+    key = keyframe(from_side(20.0), {"box": BOX, "ell": ELL})
+    up = -np.asarray(key.gravity, float)
+    layers = [layer_around(key, i, up) for i in range(2)]
+    a, b = prepare_shape(key, [0, 1], 400), prepare_shape(key, [0, 1], 400, layers=layers)
+    assert a is not None and b is not None and min(map(len, layers)) > 0
+    assert np.array_equal(a.xyz, b.xyz) and np.array_equal(a.R_upright_camera, b.R_upright_camera)
 
 
 @pytest.mark.parametrize("angle", [0.0, 75.0, 180.0])
