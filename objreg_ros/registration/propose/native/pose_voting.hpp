@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kernels of pose_voting.py.
 #pragma once
+#include <limits>
+
 #include "objreg_ros/native/binding.hpp"
 
 namespace objreg::pose_voting {
@@ -21,27 +23,46 @@ inline double aside(const Vector &n, const Vector &m, const Vector &baseline, do
   return dot(n, n) + 2.0 * dot(n, m) + dot(m, m) - along * along;
 }
 
-// Pairs (K, 2) of matches that one rigid motion can explain, from the best ones on, at most `most`.
+// Pairs (K, 2) of matches that one rigid motion can explain, from the best ones on, at most `most`. Most pairs fail by
+// their length or their height, which is looked at for several of them at a time.
 inline Array<i64, 2> consistent_pairs(Vectors P, Vectors Q, Vectors N, Vectors M, View<const double, 1> up_p,
                                       View<const double, 1> up_q, bool upright, double tolerance, double shortest,
                                       i64 most) {
+  const i64 size = P.size();
   Array<i64, 2> found(most, 2);
-  Array<bool, 1> known(P.size());
+  Array<bool, 1> known(size);
+  Array<u32, 1> alike(size);
+  Array<double, 2> columns(6, size);
   const Vector up_source{up_p(0), up_p(1), up_p(2)}, up_target{up_q(0), up_q(1), up_q(2)};
-  for (i64 i = 0; i < P.size(); i++)
+  for (i64 i = 0; i < size; i++) {
     known(i) = dot(at(N, i), at(N, i)) > 0.5 && dot(at(M, i), at(M, i)) > 0.5;
+    for (int k = 0; k < 3; k++) columns(k, i) = P(i, k), columns(3 + k, i) = Q(i, k);
+  }
+  const double *__restrict px = columns.row(0).data, *__restrict py = columns.row(1).data;
+  const double *__restrict pz = columns.row(2).data, *__restrict qx = columns.row(3).data;
+  const double *__restrict qy = columns.row(4).data, *__restrict qz = columns.row(5).data;
+  const double uneven = upright ? tolerance : std::numeric_limits<double>::infinity();
+  Array<i64, 1> keeps(size);
   i64 n = 0;
-  for (i64 j = 1; j < P.size(); j++) {
+  for (i64 j = 1; j < size; j++) {
     const Vector p = at(P, j), q = at(Q, j), nj = at(N, j), mj = at(M, j);
-    for (i64 i = 0; i < j; i++) {
-      const Vector dp = minus(p, at(P, i)), dq = minus(q, at(Q, i));
+    for (i64 i = 0; i < j; i++) {  // several pairs at a time
+      const double ax = p[0] - px[i], ay = p[1] - py[i], az = p[2] - pz[i];
+      const double bx = q[0] - qx[i], by = q[1] - qy[i], bz = q[2] - qz[i];
+      const double lp = std::sqrt(ax * ax + ay * ay + az * az), lq = std::sqrt(bx * bx + by * by + bz * bz);
+      const double hp = ax * up_source[0] + ay * up_source[1] + az * up_source[2];
+      const double hq = bx * up_target[0] + by * up_target[1] + bz * up_target[2];
+      keeps.data[i] = (lp >= shortest) & (std::abs(lp - lq) <= tolerance) & (std::abs(hp - hq) <= uneven);
+    }
+    i64 count = 0;
+    for (i64 i = 0; i < j; i++) alike(count) = static_cast<u32>(i), count += keeps(i);
+    for (i64 k = 0; k < count; k++) {
+      const i64 i = alike(k);
+      const Vector dp = minus(p, at(P, i)), dq = minus(q, at(Q, i)), ni = at(N, i), mi = at(M, i);
       const double lp = std::sqrt(dot(dp, dp)), lq = std::sqrt(dot(dq, dq));
-      if (lp < shortest || std::abs(lp - lq) > tolerance) continue;
-      const Vector ni = at(N, i), mi = at(M, i);
       if (upright) {
         const double hp = dot(dp, up_source), hq = dot(dq, up_target);
-        if (std::abs(hp - hq) > tolerance || lp * lp - hp * hp < 0.5 * shortest * shortest || lq * lq - hq * hq < ASIDE)
-          continue;
+        if (lp * lp - hp * hp < 0.5 * shortest * shortest || lq * lq - hq * hq < ASIDE) continue;
       } else if (std::min(aside(ni, nj, dp, lp), aside(mi, mj, dq, lq)) < ASIDE) {
         continue;
       }
