@@ -4,25 +4,42 @@
 #include "objreg_ros/native/binding.hpp"
 
 namespace objreg::least_squares {
-// Add to H (6, 6) and g (6,) those of errors (n,) with a weight and a Jacobian (6, n).
+// Add row and column K of the normal equations, as far as the diagonal: all sums of a row in one pass.
+template <int K> void add_row(const double *const (&J)[6], const double *__restrict error,
+                              const double *__restrict weight, i64 n, View<double, 2> H, View<double, 1> g) {
+  const double *__restrict own = J[K];
+  double pull = 0.0, totals[K + 1] = {};
+  for (i64 i = 0; i < n; i++) {
+    const double weighed = weight[i] * own[i];
+    pull += weighed * error[i];
+    for (int m = 0; m <= K; m++) totals[m] += weighed * J[m][i];
+  }
+  g(K) += pull;
+  for (int m = 0; m <= K; m++) {
+    H(K, m) += totals[m];
+    if (m != K) H(m, K) += totals[m];
+  }
+}
+
+// Add to H (6, 6) and g (6,) those of errors (n,) with a weight and the rows (n,) of a Jacobian.
+inline void add_rows(const double *const (&J)[6], const double *error, const double *weight, i64 n, View<double, 2> H,
+                     View<double, 1> g) {
+  add_row<0>(J, error, weight, n, H, g), add_row<1>(J, error, weight, n, H, g), add_row<2>(J, error, weight, n, H, g);
+  add_row<3>(J, error, weight, n, H, g), add_row<4>(J, error, weight, n, H, g), add_row<5>(J, error, weight, n, H, g);
+}
+template <i64 SIZE> void add_block(const double (&J)[6][SIZE], const double (&error)[SIZE],
+                                   const double (&weight)[SIZE], i64 n, View<double, 2> H, View<double, 1> g) {
+  check_slice(0, n, SIZE);
+  const double *const rows[6] = {J[0], J[1], J[2], J[3], J[4], J[5]};
+  add_rows(rows, error, weight, n, H, g);
+}
 inline void add_normal_equations(View<const double, 2> J, View<const double, 1> error, View<const double, 1> weight,
                                  View<double, 2> H, View<double, 1> g) {
   const i64 n = error.size();
-  Array<double, 1> weighed(n);
-  for (int k = 0; k < 6; k++) {
-    double pull = 0.0;
-    for (i64 i = 0; i < n; i++) {
-      weighed(i) = weight(i) * J(k, i);
-      pull += weighed(i) * error(i);
-    }
-    g(k) += pull;
-    for (int m = 0; m <= k; m++) {
-      double total = 0.0;
-      for (i64 i = 0; i < n; i++) total += weighed(i) * J(m, i);
-      H(k, m) += total;
-      if (m != k) H(m, k) += total;
-    }
-  }
+  check_slice(0, n, J.shape[1]), check_slice(0, n, weight.size());
+  const double *const rows[6] = {J.row(0).data, J.row(1).data, J.row(2).data,
+                                 J.row(3).data, J.row(4).data, J.row(5).data};
+  add_rows(rows, error.data, weight.data, n, H, g);
 }
 
 // Turn `b` (n,) into the x of A x = b for a positive definite `A` (n, n), by Cholesky; A is spoilt.

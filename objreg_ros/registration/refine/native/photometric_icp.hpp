@@ -34,32 +34,45 @@ inline void add_grey(Asked asked, View<const double, 2> T, Image image, View<con
   const auto &[points, shades] = asked;
   const auto &[near, far, detail, camera] = image;
   const auto [fx, fy, cx, cy] = camera;
-  const projection::Places at = projection::project(points, T, camera);
-  const Array<u32, 1> met = meeting(at, shades, image, slops);
-  Array<double, 2> J(6, met.size());
-  Array<double, 1> error(met.size()), weight(met.size());
   const View<const double, 2> R = T_target_source;
-  for (i64 k = 0; k < met.size(); k++) {
-    const u32 i = met(k);
-    const double u = at.x(i), v = at.y(i), depth = at.z(i);
-    const auto [shade, du, dv] = projection::between(detail, u, v);
-    error(k) = (shade - shades(i)) / sigma;
-    const double softened = 1.0 + error(k) * error(k);
-    weight(k) = 1.0 / (softened * softened);
-    const double nearness = 1.0 / (depth * sigma);
-    double a = du * fx * nearness, b = dv * fy * nearness, c = -(du * (u - cx) + dv * (v - cy)) * nearness;
-    double x = (u - cx) / fx * depth, y = (v - cy) / fy * depth, z = depth;
-    if (backwards) {
-      const double p = -a, q = -b, r = -c;
-      a = R(0, 0) * p + R(0, 1) * q + R(0, 2) * r;
-      b = R(1, 0) * p + R(1, 1) * q + R(1, 2) * r;
-      c = R(2, 0) * p + R(2, 1) * q + R(2, 2) * r;
-      x = points(i, 0), y = points(i, 1), z = points(i, 2);
+  constexpr i64 BLOCK = projection::BLOCK;
+  double at_u[BLOCK], at_v[BLOCK], depths[BLOCK], slope_u[BLOCK], slope_v[BLOCK], own[3][BLOCK];
+  double J[6][BLOCK], error[BLOCK], weight[BLOCK];
+  for (i64 first = 0; first < points.size(); first += BLOCK) {  // what stays in the processor's first cache
+    const i64 end = std::min(first + BLOCK, points.size());
+    const auto some = points.cut(first, end);
+    const auto own_shades = shades.cut(first, end);
+    const projection::Places at = projection::project(some, T, camera);
+    const Array<u32, 1> met = meeting(at, own_shades, image, slops);
+    const i64 n = met.size();
+    for (i64 k = 0; k < n; k++) {
+      const u32 i = met(k);
+      at_u[k] = at.x(i), at_v[k] = at.y(i), depths[k] = at.z(i);
+      const auto [shade, du, dv] = projection::between(detail, at_u[k], at_v[k]);
+      error[k] = shade - own_shades(i), slope_u[k] = du, slope_v[k] = dv;
+      for (int axis = 0; axis < 3; axis++) own[axis][k] = some(i, axis);
     }
-    J(0, k) = a, J(1, k) = b, J(2, k) = c;
-    J(3, k) = y * c - z * b, J(4, k) = z * a - x * c, J(5, k) = x * b - y * a;
+    for (i64 k = 0; k < n; k++) {  // several points at a time
+      const double u = at_u[k] - cx, v = at_v[k] - cy, depth = depths[k];
+      error[k] /= sigma;
+      const double softened = 1.0 + error[k] * error[k];
+      weight[k] = 1.0 / (softened * softened);
+      const double nearness = 1.0 / (depth * sigma);
+      double a = slope_u[k] * fx * nearness, b = slope_v[k] * fy * nearness;
+      double c = -(slope_u[k] * u + slope_v[k] * v) * nearness;
+      double x = u / fx * depth, y = v / fy * depth, z = depth;
+      if (backwards) {
+        const double p = -a, q = -b, r = -c;
+        a = R(0, 0) * p + R(0, 1) * q + R(0, 2) * r;
+        b = R(1, 0) * p + R(1, 1) * q + R(1, 2) * r;
+        c = R(2, 0) * p + R(2, 1) * q + R(2, 2) * r;
+        x = own[0][k], y = own[1][k], z = own[2][k];
+      }
+      J[0][k] = a, J[1][k] = b, J[2][k] = c;
+      J[3][k] = y * c - z * b, J[4][k] = z * a - x * c, J[5][k] = x * b - y * a;
+    }
+    least_squares::add_block(J, error, weight, n, H, g);
   }
-  least_squares::add_normal_equations(J, error, weight, H, g);
 }
 
 // Gauss-Newton on one band: moves `T` (4, 4) and fills `K` (6, 6), the information of the grey.
