@@ -17,8 +17,8 @@ from std_srvs.srv import Trigger
 from objreg_mapper import saved
 from objreg_mapper.diagnostics import MapperDiagnostics
 from objreg_mapper.follower import Follower, Followers
-from objreg_mapper.formats.g2o import graph_text
-from objreg_mapper.map_files import graph_file, require_ours
+from objreg_mapper.formats.g2o import graph_text, times_text
+from objreg_mapper.map_files import graph_file, require_ours, write_graph
 from objreg_mapper.optimisation.incremental import load
 from objreg_mapper.optimisation.problem import Problem, Solution
 from objreg_mapper.params import MapperNodeParams, MapperParams
@@ -38,7 +38,6 @@ from objreg_ros.bridge.streams.map_announcements import MapAnnouncements
 from objreg_ros.data.closures import LoopClosure, Moments, Robots, may_be_same
 from objreg_ros.diagnostics import Diagnostics
 from objreg_ros.plausibility.finding import Finding
-from objreg_ros.whole_file import write_whole
 
 PATH_REST = 20.0  # a path of many keyframes takes long to write: one in so many times as long
 LOOK_S = 0.1  # between two looks at whether the path is due
@@ -315,11 +314,10 @@ class MapperNode(NodeBase):
         try:
             with self._save_lock:
                 with self._graph_lock:
-                    poses, edges = self._graph.flat()
+                    (poses, edges), times = self._graph.flat(), self._graph.flat_times()
                     arrays = saved.packed(self._graph)
-                for path in (self._graph_file, self._saved_file):
-                    require_ours(path)
-                write_whole(self._graph_file, graph_text(poses, edges))
+                require_ours(self._saved_file)
+                write_graph(self._graph_file, graph_text(poses, edges), times_text(times))
                 saved.save(arrays, self._saved_file)
         except OSError as error:
             return False, str(error)

@@ -290,6 +290,11 @@ class PoseGraph:
         ]
         return [T for path in paths for _, T in path], edges
 
+    def flat_times(self) -> list[tuple[int, int]]:
+        """The stamp in ns of each keyframe of `flat`, and the number of its session."""
+        placed = [number for number in range(len(self.sessions)) if self.is_in_map(number)]
+        return [(int(stamp), number) for number in placed for stamp in self.sessions[number].keyframes.stamps_ns]
+
     def corrected(self, stamps_ns: Iterable[int], robot: str = "", session: int | None = None) -> list[Array]:
         """``T_map_body`` at any stamps that a robot's newest odometry covers; ValueError for one that it does not.
 

@@ -17,8 +17,8 @@ from objreg_mapper.adapters.diagnostics import G2oDiagnostics
 from objreg_mapper.adapters.odometry_in import OdometryIn
 from objreg_mapper.adapters.params import BodyParams, ToG2oParams
 from objreg_mapper.closure_constraint import ImplausibleError
-from objreg_mapper.formats.g2o import graph_text
-from objreg_mapper.map_files import graph_file, require_ours
+from objreg_mapper.formats.g2o import graph_text, times_text
+from objreg_mapper.map_files import graph_file, write_graph
 from objreg_mapper.params import MapperParams
 from objreg_mapper.pose_graph import PoseGraph
 from objreg_mapper.restart import Anew
@@ -27,7 +27,6 @@ from objreg_ros.bridge.node.spin import run
 from objreg_ros.data.closures import LoopClosure, Moments
 from objreg_ros.data.frames import Odometry
 from objreg_ros.diagnostics import Diagnostics
-from objreg_ros.whole_file import write_whole
 
 
 class ToG2o(Adapter):
@@ -104,7 +103,9 @@ class ToG2o(Adapter):
     def _write(self) -> Future[None]:
         """Begin to write the graph as it is now, whole or not at all; OSError in what comes back if it cannot be."""
         self._has_news = False
-        self._writing = self._writer.submit(_written, self.path, graph_text(*self._graph.flat()))
+        self._writing = self._writer.submit(
+            write_graph, self.path, graph_text(*self._graph.flat()), times_text(self._graph.flat_times())
+        )
         self._writing.add_done_callback(self._look_at)
         return self._writing
 
@@ -141,11 +142,6 @@ class ToG2o(Adapter):
         finally:
             self._writer.shutdown()
             super().close()
-
-
-def _written(path: Path, text: str) -> None:
-    require_ours(path)
-    write_whole(path, text)
 
 
 def main() -> int:

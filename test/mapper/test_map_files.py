@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from objreg_mapper import saved
-from objreg_mapper.formats.g2o import graph_text
-from objreg_mapper.map_files import graph_file, require_ours
+from objreg_mapper.formats.g2o import TIMES, graph_text, times_file, times_text
+from objreg_mapper.map_files import graph_file, require_ours, write_graph
 from objreg_mapper.params import MapperParams
 from objreg_mapper.pose_graph import PoseGraph
 
@@ -25,6 +25,24 @@ def test_a_graph_and_a_map_that_we_wrote_are_ours(tmp_path: Path) -> None:
     for path in (text, arrays, tmp_path / "none.g2o"):
         require_ours(path)
     assert graph_file(str(text)) == text
+
+
+def test_a_graph_is_written_with_the_times_of_its_vertices_and_again(tmp_path: Path) -> None:
+    path = graph_file(str(tmp_path / "map.g2o"))
+    for count in (2, 3):
+        write_graph(path, graph_text(THREE_POSES[:count], []), times_text([(5, 0)] * count))
+        assert len(times_file(path).read_text().splitlines()) == 1 + count == 1 + len(path.read_text().splitlines())
+    assert graph_file(str(path)) == path
+
+
+def test_times_that_are_not_ours_are_kept_and_the_graph_is_not_written(tmp_path: Path) -> None:
+    path = tmp_path / "map.g2o"
+    times_file(path).write_text(f"{TIMES},mine\n")
+    with pytest.raises(OSError, match="expected a map or none, got another file"):
+        write_graph(path, graph_text(THREE_POSES, []), times_text([(5, 0)] * 3))
+    with pytest.raises(ValueError, match=r"graph_path: .*map\.g2o\.times\.csv"):
+        graph_file(str(path))
+    assert not path.exists() and times_file(path).read_text() == f"{TIMES},mine\n"
 
 
 def test_an_empty_file_is_written_over(tmp_path: Path) -> None:

@@ -469,10 +469,13 @@ def test_the_keyframes_of_sessions_are_numbered_in_one_row_once_they_are_in_the_
     for a, b in ((20, 21), (60, 62)):
         assert graph.add_closure(across(a, b))
     poses, edges = graph.flat()
+    assert {session for _, session in graph.flat_times()} == {0} and len(graph.flat_times()) == first
     assert len(poses) == first and [edge[:2] for edge in edges] == [(k, k + 1) for k in range(first - 1)]
     graph.optimise()
     poses, edges = graph.flat()
     rows = [*range(first - 1), *range(first, first + second - 1)]
+    times = [(stamp, n) for n, one in enumerate(graph.sessions) for stamp in one.keyframes.stamps_ns]
+    assert graph.flat_times() == times and len(times) == len(poses)
     assert len(poses) == first + second and [edge[:2] for edge in edges[:-2]] == [(k, k + 1) for k in rows]
     for k1, k2, constraint in edges:
         assert pose_error(inverse(poses[k1]) @ poses[k2], constraint.T_from_to)[1] < 10.0

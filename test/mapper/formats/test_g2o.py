@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from pathlib import Path
 
-from objreg_mapper.formats.g2o import edge_text, graph_text
+import numpy as np
+import pytest
+
+from objreg_mapper.formats.g2o import edge_text, graph_text, times_file, times_text
+from objreg_ros.geometry import pose_error
 
 from .blank import CONSTRAINT, LOCAL_INFORMATION_DIAGONAL, QUARTER_LEFT
 
@@ -22,12 +26,33 @@ def test_an_edge_has_ids_pose_and_the_upper_triangle_translation_first() -> None
     np.testing.assert_allclose(upper, np.diag(LOCAL_INFORMATION_DIAGONAL), atol=1e-12)
 
 
-def test_a_graph_lists_its_vertices_fixes_the_first_and_ends_with_its_edges() -> None:
+def test_a_graph_lists_its_vertices_and_then_its_edges_and_nothing_else() -> None:
     lines = graph_text([np.eye(4), QUARTER_LEFT], [(0, 1, CONSTRAINT)]).splitlines()
     assert [line.split()[:2] for line in lines] == [
         ["VERTEX_SE3:QUAT", "0"],
         ["VERTEX_SE3:QUAT", "1"],
-        ["FIX", "0"],
         ["EDGE_SE3:QUAT", "0"],
     ]
     assert graph_text([], []) == ""
+
+
+def test_gtsam_reads_the_poses_and_the_information_that_were_written(tmp_path: Path) -> None:
+    gtsam = pytest.importorskip("gtsam", reason="gtsam is not installed")
+    file = tmp_path / "map.g2o"
+    file.write_text(graph_text([np.eye(4), QUARTER_LEFT], [(0, 1, CONSTRAINT)]))
+    graph, poses = gtsam.readG2o(str(file), True)
+    assert (graph.size(), poses.size()) == (1, 2)
+    assert max(pose_error(poses.atPose3(1).matrix(), QUARTER_LEFT)) < 1e-6
+    factor = graph.at(0)
+    assert max(pose_error(factor.measured().matrix(), CONSTRAINT.T_from_to)) < 1e-6
+    rotation_first = np.roll(LOCAL_INFORMATION_DIAGONAL, 3)
+    np.testing.assert_allclose(np.diag(factor.noiseModel().information()), rotation_first, rtol=1e-6)
+
+
+def test_the_times_of_the_vertices_are_whole_nanoseconds_in_a_file_beside_it() -> None:
+    assert times_file(Path("out/map.g2o")) == Path("out/map.g2o.times.csv")
+    assert times_text([(1_795_000_000_123_456_789, 0), (5, 2)]).splitlines() == [
+        "vertex,stamp_ns,session",
+        "0,1795000000123456789,0",
+        "1,5,2",
+    ]
