@@ -35,10 +35,12 @@ class Outputs:
         voxel: float,
         rerun: Path | None,
         mcap: Path | None,
+        tum_before: Path | None = None,
+        tum_truth: Path | None = None,
     ) -> Outputs:
         """Those of the options. ValueError for a voxel that is none."""
         try:
-            files = MapFiles(tum, kitti, g2o, cloud, voxel)
+            files = MapFiles(tum, kitti, g2o, cloud, voxel, tum_before, tum_truth)
         except ValueError as error:
             raise ValueError(f"--voxel: {error}") from error
         return cls(files, SceneFiles(rerun, mcap))
@@ -58,6 +60,11 @@ class Outputs:
             raise ValueError(
                 f"{source.path}: {', '.join(self.files.wanted)}: expected a trajectory, which a map corrects, got "
                 f"--odometry none; leave it out or take --odometry tracked, or one of {there} with --odometry TOPIC"
+            )
+        if self.files.tum_truth is not None and not has_truth:
+            raise ValueError(
+                f"{source.path}: --tum-truth: expected a ground truth in the recording, got none; leave it out, or "
+                "name its topic with --remap ground_truth:=TOPIC"
             )
         self.scenes.require_trajectory(source.path, has_trajectory or has_truth)
 

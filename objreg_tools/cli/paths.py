@@ -16,6 +16,7 @@ from typing import Any
 
 import click
 
+from objreg_mapper.formats.g2o import times_file
 from objreg_ros import share
 from objreg_ros.detector.labels import ENDS, LABEL_MAP
 from objreg_ros.memory.claim import HELPERS
@@ -83,6 +84,18 @@ class SettingsPath(InputPath):
 class OutputPath(click.Path):
     """A file or a folder that is written."""
 
+    def files(self, value: Path) -> Iterator[Path]:
+        """What is written where the option is ``value``: it, and what is put beside it."""
+        yield value
+
+
+class GraphPath(OutputPath):
+    """A g2o file: the times of its vertices are written beside it."""
+
+    def files(self, value: Path) -> Iterator[Path]:
+        """See `OutputPath.files`."""
+        yield from (value, times_file(value)) if value.name else (value,)
+
 
 INPUTS = (InputPath, InputText)
 
@@ -116,6 +129,8 @@ def require_apart(command: click.Command, given: Mapping[str, Any]) -> None:
                     f"{name}: expected a place apart from all that is read, got {output}, of {other}; choose another"
                 )
     for parameter, output in _outputs(command, given):
+        if output.is_dir() and not parameter.type.dir_okay:
+            raise OSError(f"{_named(parameter)}: expected a file, got the folder {output}; choose another place")
         if not output.is_dir():
             require_writable(_named(parameter), _first_missing(output) if parameter.type.dir_okay else output)
 
@@ -130,7 +145,7 @@ def _outputs(command: click.Command, given: Mapping[str, Any]) -> Iterator[tuple
     for parameter in command.params:
         value = given.get(parameter.name or "")
         if isinstance(parameter.type, OutputPath) and value not in (None, STANDARD_OUTPUT):
-            yield parameter, value
+            yield from ((parameter, file) for file in parameter.type.files(value))
 
 
 def _inputs(command: click.Command, given: Mapping[str, Any]) -> Iterator[tuple[str, Path]]:

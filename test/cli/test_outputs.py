@@ -16,7 +16,8 @@ from objreg_tools.cli.outputs import Outputs
 def asked(folder: Path, *options: str, voxel: float = 0.02) -> Outputs:
     files = {option: folder / option for option in options}
     names = ("tum", "kitti", "g2o", "cloud")
-    return Outputs.of(*(files.get(name) for name in names), voxel, None, files.get("mcap"))
+    of_map = (files.get(name) for name in names)
+    return Outputs.of(*of_map, voxel, None, files.get("mcap"), files.get("before"), files.get("truth"))
 
 
 BAG: Any = SimpleNamespace(path=Path("bag"), topics={"/image": None})
@@ -36,6 +37,13 @@ def test_a_map_wants_a_trajectory_and_says_how_to_get_one(tmp_path: Path) -> Non
     asked(tmp_path, "tum").require_trajectory(BAG, has_trajectory=True, has_truth=False)
     with pytest.raises(ValueError, match=r"--tum: expected a trajectory.*--odometry none.*--odometry tracked"):
         asked(tmp_path, "tum").require_trajectory(BAG, has_trajectory=False, has_truth=True)
+
+
+def test_a_true_trajectory_wants_a_ground_truth(tmp_path: Path) -> None:
+    asked(tmp_path, "truth").require_trajectory(BAG, has_trajectory=True, has_truth=True)
+    asked(tmp_path, "before").require_trajectory(BAG, has_trajectory=True, has_truth=False)
+    with pytest.raises(ValueError, match="--tum-truth: expected a ground truth in the recording, got none"):
+        asked(tmp_path, "truth").require_trajectory(BAG, has_trajectory=True, has_truth=False)
 
 
 def test_a_scene_is_content_with_truth(tmp_path: Path) -> None:

@@ -249,3 +249,13 @@ def test_links_in_a_circle_are_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "circle").symlink_to("circle")
     with pytest.raises(OSError, match=r"^--out: expected a place .*, got at .*circle: Too many levels of symbolic"):
         require_writable("--out", tmp_path / "circle")
+
+
+def test_the_times_of_a_graph_are_an_output_too(tmp_path: Path) -> None:
+    recording = tum_folder(tmp_path / "rec")
+    graph, times = tmp_path / "map.g2o", tmp_path / "map.g2o.times.csv"
+    with pytest.raises(ValueError, match="expected a file of its own, got that of"):
+        run("offline", recording, "--g2o", graph, "--tum", times)
+    times.mkdir()
+    with pytest.raises(OSError, match=r"--g2o: expected a file, got the folder .*times"):
+        run("offline", recording, "--g2o", graph)

@@ -14,7 +14,7 @@ from tqdm import tqdm
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_tools.cli import options
 from objreg_tools.cli.outputs import Outputs
-from objreg_tools.cli.paths import STANDARD_OUTPUT, OutputPath
+from objreg_tools.cli.paths import STANDARD_OUTPUT, GraphPath, OutputPath
 from objreg_tools.cli.recorded import Opened, RecordedOptions
 from objreg_tools.cli.run_output import (
     exit_code,
@@ -42,8 +42,15 @@ FILE = OutputPath(dir_okay=False, path_type=Path)
 @click.option(
     "--tum", type=FILE, help="Write the corrected trajectory here: stamp tx ty tz qx qy qz qw, as evo reads it."
 )
+@click.option("--tum-before", type=FILE, help="Likewise as it was before constraints corrected it.")
+@click.option("--tum-truth", type=FILE, help="Likewise the ground truth of the recording, at the same stamps.")
 @click.option("--kitti", type=FILE, help="Write it here as 12 numbers a pose, of the 3x4 matrix. KITTI has no stamps.")
-@click.option("--g2o", type=FILE, help="Write the corrected pose graph here, without the constraints that were pruned.")
+@click.option(
+    "--g2o",
+    type=GraphPath(dir_okay=False, path_type=Path),
+    help="Write the corrected pose graph here, without the constraints that were pruned, and the times of its vertices "
+    "beside it, as FILE.times.csv.",
+)
 @click.option("--map", "cloud", type=FILE, metavar="FILE.ply", help="Write the corrected cloud of the keyframes here.")
 @click.option(
     "--voxel",

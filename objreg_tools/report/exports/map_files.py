@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,9 +28,10 @@ SAME_POSE = 1e-6  # m, and of the entries of a rotation
 class MapFiles:
     """Where what of a corrected map is written, None for nowhere; ``voxel`` m is the side of a voxel of ``cloud``.
 
-    ``tum`` and ``kitti`` have the pose of the camera (optical frame) at every frame, ``g2o`` the keyframes of the
-    mapper with what ties them but the constraints that were pruned, ``cloud`` (PLY) the views of the registrar's
-    keyframes. ValueError for a voxel that is none.
+    ``tum`` and ``kitti`` have the pose of the camera (optical frame) at every frame, ``tum_before`` that before the
+    constraints correct it, ``tum_truth`` the true one where it is known, ``g2o`` the keyframes of the mapper with what
+    ties them but the constraints that were pruned, and beside it their times, ``cloud`` (PLY) the views of the
+    registrar's keyframes. ValueError for a voxel that is none.
     """
 
     tum: Path | None = None
@@ -38,6 +39,8 @@ class MapFiles:
     g2o: Path | None = None
     cloud: Path | None = None
     voxel: float = VOXEL_M
+    tum_before: Path | None = None
+    tum_truth: Path | None = None
 
     def __post_init__(self) -> None:
         require_voxel(self.voxel)
@@ -45,7 +48,14 @@ class MapFiles:
     @property
     def wanted(self) -> dict[str, Path]:
         """The files that are asked for, by the names of their options."""
-        files = {"--tum": self.tum, "--kitti": self.kitti, "--g2o": self.g2o, "--map": self.cloud}
+        files = {
+            "--tum": self.tum,
+            "--tum-before": self.tum_before,
+            "--tum-truth": self.tum_truth,
+            "--kitti": self.kitti,
+            "--g2o": self.g2o,
+            "--map": self.cloud,
+        }
         return {option: file for option, file in files.items() if file is not None}
 
     def write(self, run: RunSummary, store: Path, notify: Callable[[str], None] = lambda line: None) -> None:
@@ -54,19 +64,27 @@ class MapFiles:
         ``notify`` receives what was written and what was left out. ValueError for a run without a trajectory: it has no
         map. OSError where a file cannot be written, StoreError (one of them) where the store cannot be read.
         """
-        stamps, _, corrected = run.poses_before_and_after()
+        stamps, before, corrected = run.poses_before_and_after()
         if not stamps:
             raise ValueError(f"{', '.join(self.wanted)}: {_why_no_map(run)}")
-        if self.tum is not None:
-            write_whole(self.tum, tum.trajectory_text(zip(stamps, corrected, strict=True)))
-            notify(f"{self.tum}: {len(stamps)} poses")
+        trajectories = (
+            (self.tum, list(zip(stamps, corrected, strict=True))),
+            (self.tum_before, list(zip(stamps, before, strict=True))),
+            (self.tum_truth, list(_true(run, stamps))),
+        )
+        for file, trajectory in trajectories:
+            if file is not None:
+                write_whole(file, tum.trajectory_text(trajectory))
+                notify(f"{file}: {len(trajectory)} poses")
         if self.kitti is not None:
             write_whole(self.kitti, kitti.trajectory_text(corrected))
             notify(f"{self.kitti}: {len(stamps)} poses")
         if self.g2o is not None:
             keyframes, edges = run.graph.flat(left_out=run.pruned)
+            times = g2o.times_file(self.g2o)
+            write_whole(times, g2o.times_text(run.graph.flat_times()))
             write_whole(self.g2o, g2o.graph_text(keyframes, edges))
-            notify(f"{self.g2o}: {len(keyframes)} keyframes, {len(edges)} edges")
+            notify(f"{self.g2o}: {len(keyframes)} keyframes, {len(edges)} edges; their times in {times.name}")
         if self.cloud is not None:
             poses = {frame.stamp_ns: (frame.T_session_camera, frame.T_map_camera) for frame in run.map.frames}
             cloud = cloud_of(_keyframes(store, notify), poses, self.voxel, notify, by_odometry=not run.by_tracking)
@@ -115,6 +133,11 @@ def _corrected(keyframe: Keyframe, poses: dict[int, tuple[Array, Array]]) -> Arr
     if T_session_camera is None or keyframe.T_odom_camera is None:
         return None
     return T_map_camera if np.allclose(keyframe.T_odom_camera, T_session_camera, rtol=0.0, atol=SAME_POSE) else None
+
+
+def _true(run: RunSummary, stamps_ns: Iterable[int]) -> Iterator[tuple[int, Array]]:
+    """The stamps that truth covers, with ``T_world_camera`` at each."""
+    return ((stamp, T) for stamp in stamps_ns if (T := run.truth.at(stamp)) is not None)
 
 
 def _why_no_map(run: RunSummary) -> str:

@@ -67,6 +67,28 @@ def test_the_trajectories_are_the_corrected_way_at_every_frame(walk: RunSummary,
     assert told == [f"{tmp_path / name}: {COUNT} poses" for name in ("way.tum", "way.kitti")]
 
 
+def test_the_trajectory_before_it_was_corrected_and_the_true_one_have_the_same_stamps(
+    walk: RunSummary, tmp_path: Path
+) -> None:
+    files = {"tum": tmp_path / "after", "tum_before": tmp_path / "before", "tum_truth": tmp_path / "true"}
+    MapFiles(**files).write(walk, NOWHERE)
+    after, before, true = map(rows_of, files.values())
+    np.testing.assert_array_equal(before[:, 0], after[:, 0])
+    np.testing.assert_array_equal(true[:, 0], after[:, 0])
+    _, odometry, _ = walk.poses_before_and_after()
+    np.testing.assert_allclose(before[:, 1:4], [T[:3, 3] for T in odometry], atol=1e-8)
+    np.testing.assert_allclose(true[:, 1:4], [T[:3, 3] for T in TRUE], atol=1e-8)
+
+
+def test_of_our_own_tracking_the_trajectory_before_is_written_too(tmp_path: Path) -> None:
+    rows = [
+        {"stamp_ns": k * SECOND, "tracked": {"session": 4, "T_session_camera": moved(k).tolist()}} for k in range(3)
+    ]
+    run = RunSummary.of("straight", {"glimpses": rows, "constraints": [], "odometry": "tracked"}, Truth([]))
+    MapFiles(tum_before=tmp_path / "before").write(run, NOWHERE)
+    assert rows_of(tmp_path / "before")[:, :4].tolist() == [[k, k, 0, 0] for k in range(3)]
+
+
 def test_the_graph_has_the_keyframes_and_what_ties_them_but_what_was_pruned(walk: RunSummary, tmp_path: Path) -> None:
     MapFiles(g2o=tmp_path / "graph.g2o").write(walk, NOWHERE)
     lines = [line.split() for line in (tmp_path / "graph.g2o").read_text().splitlines()]
@@ -75,6 +97,9 @@ def test_the_graph_has_the_keyframes_and_what_ties_them_but_what_was_pruned(walk
     count = len(walk.graph.keyframes)
     assert len(walk.pruned) == 1
     assert len(vertices) == count and len(edges) == count - 1 + 4
+    times = [line.split(",") for line in (tmp_path / "graph.g2o.times.csv").read_text().splitlines()[1:]]
+    assert [int(row[0]) for row in times] == list(range(count))
+    assert [int(row[1]) for row in times] == [stamp for stamp, _ in walk.graph.path()]
     np.testing.assert_allclose(np.array(vertices[-1][2:5], float), walk.graph.path()[-1][1][:3, 3], atol=1e-8)
 
 
