@@ -22,7 +22,7 @@ from objreg_tools.recording.camera_from_text import with_camera
 from objreg_tools.recording.drift import ODOM, with_drifting_odometry
 from objreg_tools.recording.inputs import TF_ODOM, Inputs, alternatives, choose_inputs, parse_remaps
 from objreg_tools.recording.mounts import camera_frame, first_frames, frame_tree, moving_topics
-from objreg_tools.recording.recorded_detections import RecordedDetections, choose_detections
+from objreg_tools.recording.recorded_detections import RecordedDetections, choose_detections, recorded_detections
 from objreg_tools.recording.tf_odometry import by_transforms, with_transforms
 from objreg_tools.recording.troubles import FOLDER, unpaired
 from objreg_tools.rehearsal import SeesNothing
@@ -40,6 +40,7 @@ NOT_ON_TF = (
     "expected a moving frame above the camera on /tf, as odom → base_link, got none; is the camera's frame tied to it?"
 )
 TAKEN = "of several cameras that of {} is taken; there is also {}: objreg inspect has the --remap of each"
+DETECTED = "the recording holds detections of another detector, which are not used: --detections {} takes them"
 CAMERAS_OWN = (
     "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
 )
@@ -140,7 +141,12 @@ class Opened:
         left_out = [CAMERAS_OWN.format(self.asked.odometry)] if self.asked.drifts and is_given else []
         by_itself = [BY_TRACKING] if self.odometry == TRACKED and self.asked.odometry is None else []
         of_recording = (*self.source.notes, *self._choice(segmenter.source), *by_transforms(self.source, self.inputs))
-        return (*of_recording, *self.truth.notes, *left_out, *by_itself)
+        return (*of_recording, *self._detected(), *self.truth.notes, *left_out, *by_itself)
+
+    def _detected(self) -> list[str]:
+        """The first detections of the recording, where it has some and they were not asked for."""
+        there = [] if self.recorded else recorded_detections(self.source.topics)
+        return [DETECTED.format(there[0].topic)] if there else []
 
     def _choice(self, source: str) -> list[str]:
         """The camera that was taken, where the recording has others that could be meant."""

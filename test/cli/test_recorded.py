@@ -58,6 +58,14 @@ def test_recorded_detections_are_run_without_the_detector(tmp_path: Path) -> Non
     assert [row["labels"] for row in summary["glimpses"]] == [["mug"]] * 2
 
 
+def test_recorded_detections_that_nobody_asked_for_are_named_and_not_used(tmp_path: Path) -> None:
+    asked, bag = RecordedOptions(read_settings(None, ())), detected_bag(tmp_path / "bag", frames=2)
+    with asked.opened(bag) as opened, replace(asked, detections="/yolo/instance_masks").opened(bag) as other:
+        (note,) = [note for note in opened.notes if "detections" in note]
+        assert note.endswith("which are not used: --detections /yolo/detections takes them")
+        assert opened.recorded is None and not [note for note in other.notes if "detections" in note]
+
+
 def test_odometry_that_is_there_is_left_out_where_tracking_is_asked_for(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", with_odometry(tum_folder(tmp_path / "tum", frames=2)))
     asked = RecordedOptions(read_settings(None, ()))
