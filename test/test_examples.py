@@ -20,8 +20,9 @@ SAYS = {
     "own_gate.py": "several: Reason.FEW_OBJECTS",
     "consume_constraints.py": "EDGE_SE3:QUAT 0 1",
     "objreg_to_gtsam.py": "solved: the second camera is at [0.1, 0.0, 0.02] m",
+    "solve_g2o.py": "0.500000 0.000000 0.000000 1.000000",
 }
-NEEDS = {"consume_constraints.py": "rclpy", "objreg_to_gtsam.py": "gtsam"}
+NEEDS = {"consume_constraints.py": "rclpy", "objreg_to_gtsam.py": "gtsam", "solve_g2o.py": "gtsam"}
 MOST_LINES = 40
 MOST_BYTES = 400_000  # of the notebook with its pictures
 PATIENCE_S = 900  # where every kernel has to be compiled first
