@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from objreg_mapper.formats.tum import trajectory_text
+
 try:
     import gtsam
 except ImportError:
@@ -26,15 +28,13 @@ def solve(file: Path) -> None:
     graph, poses = gtsam.readG2o(str(file), True, gtsam.KernelFunctionType.KernelFunctionTypeHUBER)
     graph.add(gtsam.PriorFactorPose3(0, poses.atPose3(0), gtsam.noiseModel.Isotropic.Sigma(6, 1e-6)))
     solved = gtsam.LevenbergMarquardtOptimizer(graph, poses).optimize()
-    for row in csv.DictReader(file.with_name(f"{file.name}.times.csv").open(encoding="utf-8")):
-        pose, seconds = solved.atPose3(int(row["vertex"])), int(row["stamp_ns"]) * 1e-9
-        q = pose.rotation().toQuaternion()
-        print(f"{seconds:.6f}", *(f"{v:.6f}" for v in (*pose.translation(), q.x(), q.y(), q.z(), q.w())))
+    rows = csv.DictReader(file.with_name(f"{file.name}.times.csv").open(encoding="utf-8"))
+    path = [(int(row["stamp_ns"]), solved.atPose3(int(row["vertex"])).matrix()) for row in rows]
+    print(trajectory_text(path), end="")
 
 
 if __name__ == "__main__":
     with TemporaryDirectory() as folder:
-        own = Path(folder, "map.g2o")
-        own.write_text(SMALL, encoding="utf-8")
-        Path(folder, "map.g2o.times.csv").write_text(TIMES, encoding="utf-8")
-        solve(Path(sys.argv[1]) if len(sys.argv) > 1 else own)
+        for name, text in (("map.g2o.times.csv", TIMES), ("map.g2o", SMALL)):
+            Path(folder, name).write_text(text, encoding="utf-8")
+        solve(Path(sys.argv[1] if len(sys.argv) > 1 else Path(folder, "map.g2o")))

@@ -20,7 +20,7 @@ SAYS = {
     "own_gate.py": "several: Reason.FEW_OBJECTS",
     "consume_constraints.py": "EDGE_SE3:QUAT 0 1",
     "objreg_to_gtsam.py": "solved: the second camera is at [0.1, 0.0, 0.02] m",
-    "solve_g2o.py": "0.500000 0.000000 0.000000 1.000000",
+    "solve_g2o.py": "0.500000000 0.000000000 0.000000000 1.000000000",
 }
 NEEDS = {"consume_constraints.py": "rclpy", "objreg_to_gtsam.py": "gtsam", "solve_g2o.py": "gtsam"}
 MOST_LINES = 40
