@@ -62,14 +62,23 @@ def test_what_holds_no_detections_is_refused_with_what_does(tmp_path: Path) -> N
             choose_detections(recording, "/odom")
 
 
-def test_a_bag_without_the_definition_is_refused_with_what_to_do(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bag = detected_bag(tmp_path / "bag", 1, StoragePlugin.SQLITE3)
+def without_definitions(bag: Path) -> Path:
+    """The bag as a recorder of Humble would have written it."""
     with sqlite3.connect(next(bag.glob("*.db3"))) as storage:
         storage.execute("DELETE FROM message_definitions")
+    return bag
+
+
+def test_a_bag_of_humble_without_definitions_is_read_and_says_how(tmp_path: Path) -> None:
+    bag = without_definitions(detected_bag(tmp_path / "bag", 2, StoragePlugin.SQLITE3))
     with open_recording(bag) as recording:
-        types = recording._types()
-        monkeypatch.setattr(types, "fielddefs", {k: v for k, v in types.fielddefs.items() if "vision" not in k})
-        with pytest.raises(ValueError, match=f"expected the definition of {BOXES} in the bag, got none"):
-            choose_detections(recording, "/yolo/detections")
+        chosen = choose_detections(recording, "/yolo/detections")
+        message = next(recording.records([chosen.topic])).message
+        assert vision_from_msg.detections(message, {4: "mug"}, (48, 64)).label == ("mug",)
+        (note,) = recording.notes
+    assert note == f"the bag does not define {BOXES}, {NAMES}: read as vision_msgs of version 3 or 4 has it"
+
+
+def test_the_definitions_of_the_bag_itself_count(tmp_path: Path) -> None:
+    with open_recording(detected_bag(tmp_path / "bag", 2, StoragePlugin.SQLITE3)) as recording:
+        assert recording.notes == []

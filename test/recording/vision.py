@@ -3,39 +3,26 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_types_from_msg
+from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from objreg_tools.recording import Record
 from objreg_tools.recording.rosbag import messages
-from objreg_tools.recording.rosbag.messages import standard_types
+from objreg_tools.recording.rosbag.vision_types import DEFINITIONS, PACKAGE, define_vision
 
 from .sample_folders import records
 
-DEFINITIONS = {
-    "Point2D": "float64 x\nfloat64 y",
-    "Pose2D": "vision_msgs/Point2D position\nfloat64 theta",
-    "BoundingBox2D": "vision_msgs/Pose2D center\nfloat64 size_x\nfloat64 size_y",
-    "ObjectHypothesis": "string class_id\nfloat64 score",
-    "ObjectHypothesisWithPose": "vision_msgs/ObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose",
-    "Detection2D": "std_msgs/Header header\nvision_msgs/ObjectHypothesisWithPose[] results\n"
-    "vision_msgs/BoundingBox2D bbox\nstring id",
-    "Detection2DArray": "std_msgs/Header header\nvision_msgs/Detection2D[] detections",
-    "VisionClass": "uint16 class_id\nstring class_name",
-    "LabelInfo": "std_msgs/Header header\nvision_msgs/VisionClass[] class_map\nfloat32 threshold",
-}
 
-
+@cache
 def vision_types() -> Typestore:
-    types = standard_types()
-    if "vision_msgs/msg/Point2D" not in types.fielddefs:
-        for name, text in DEFINITIONS.items():
-            types.register(get_types_from_msg(text, f"vision_msgs/msg/{name}"))
+    types = get_typestore(Stores.ROS2_JAZZY)
+    define_vision(types, [f"{PACKAGE}Detection2DArray"])
     return types
 
 

@@ -35,12 +35,14 @@ from objreg_tools.recording.rosbag.bag_errors import (
 from objreg_tools.recording.rosbag.bag_files import open_bag
 from objreg_tools.recording.rosbag.messages import READ, difference, misfit, serialise, standard_types
 from objreg_tools.recording.rosbag.unpacking import ZSTD_MAGIC, bound_unpacking
+from objreg_tools.recording.rosbag.vision_types import define_vision
 
 END_OF_TIME_NS = 2**63
 UNDEFINED = (
     "{}: {}: expected the definition of {} in the bag, got none; `ros2 bag convert` it to mcap where its package is "
     "installed"
 )
+ASSUMED = "the bag does not define {}: read as vision_msgs of version 3 or 4 has it"
 REINDEX = "make metadata.yaml anew with `ros2 bag reindex`, or move it away"
 
 bound_unpacking()
@@ -55,7 +57,7 @@ class BagRecording(Recording):
         self._reader, self._kept, self._files = bag.reader, bag.kept, bag.files
         self.kind = _kind(bag.files)
         self._connections, notes = _one_type_each(self._reader.connections)
-        self.notes = [*bag.notes, *notes]
+        self.notes = [*bag.notes, *notes, *self._define()]
         self.topics = _topics(self._connections)
         found = {kind: misfit(kind, self._types()) for kind in READ if kind in self._types().fielddefs}
         self._misfits = {kind: why for kind, why in found.items() if why}
@@ -93,6 +95,12 @@ class BagRecording(Recording):
             return super()._obstacle(msgtype, shipped_only)
         passes = not shipped_only and msgtype not in standard_types().fielddefs
         return "" if passes else difference(msgtype, self._types())
+
+    def _define(self) -> list[str]:
+        """Take definitions of ours for what a rosbag2 does not define, and a note on that."""
+        used = (connection.msgtype for connection in self._connections)
+        taken = define_vision(self._types(), used) if self._reader.is2 else []
+        return [ASSUMED.format(", ".join(taken))] if taken else []
 
     def _types(self) -> Typestore:
         return self._reader.typestore
