@@ -20,6 +20,7 @@ from objreg_ros.registration.gate.kinds import KINDS, readings_of
 from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.gate.weights import PRIOR, UNKNOWN, WEIGHTS
 
+BEFORE = "prior"  # of the terms: what is known before any evidence
 ODDS = 75.0  # right poses for each false one, among poses as sure as the least sure one that is accepted
 
 
@@ -30,7 +31,13 @@ def odds_of(candidate: Candidate) -> float:
 
 def log_odds(readings: Mapping[str, float | None]) -> float:
     """The decimal logarithm of the odds that a pose with such readings is right; a kind that is missing is unknown."""
-    return PRIOR + sum(weigh(name, readings.get(name)) for name in KINDS)
+    before, *weights = terms(readings).values()
+    return before + sum(weights)
+
+
+def terms(readings: Mapping[str, float | None]) -> dict[str, float]:
+    """What `log_odds` adds up, in decimal logarithms: the `BEFORE` of all evidence, then the weight of each kind."""
+    return {BEFORE: PRIOR} | {name: weigh(name, readings.get(name)) for name in KINDS}
 
 
 def weigh(name: str, reading: float | None) -> float:

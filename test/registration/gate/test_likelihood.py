@@ -8,7 +8,7 @@ import pytest
 from objreg_ros.data.closures import Reason
 from objreg_ros.registration.gate import likelihood
 from objreg_ros.registration.gate.kinds import KINDS, readings_of
-from objreg_ros.registration.gate.likelihood import check, log_odds, odds_of, weigh
+from objreg_ros.registration.gate.likelihood import BEFORE, check, log_odds, odds_of, terms, weigh
 from registration.gate.samples import CUP
 from registration.samples import candidate
 
@@ -37,6 +37,13 @@ def test_weights_add_up_to_the_logarithm_of_the_odds() -> None:
     one = candidate(certain_violations=0.001, correlation=0.65)
     assert log_odds(readings_of(one)) == pytest.approx(0.5 + 0.5 + 1.0)
     assert odds_of(one) == pytest.approx(100.0)
+
+
+def test_the_terms_are_the_prior_and_the_weight_of_each_kind() -> None:
+    readings = readings_of(candidate(matched=(CUP,)))
+    of = terms(readings)
+    assert list(of) == [BEFORE, *KINDS] and sum(of.values()) == pytest.approx(log_odds(readings))
+    assert all(of[name] == weigh(name, reading) for name, reading in readings.items())
 
 
 def test_a_pose_is_refused_below_the_least_odds_for_what_it_lacks_most() -> None:
