@@ -16,6 +16,7 @@ from objreg_ros.data.frames import Frame
 from objreg_ros.pipeline import Segmented
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.segmenter.sensor.sensor_estimate import Lag
+from objreg_tools.offline.outlines import field_of_view_deg, outline
 from objreg_tools.offline.stages import Registers
 from objreg_tools.truth import Truth, summarise
 
@@ -27,6 +28,7 @@ class Run:
     frames: int = 0
     detections: int = 0
     objects: int = 0
+    field_of_view_deg: tuple[float, float] | None = None  # the width and the height of its pictures
     lens: str = ""  # what was assumed of it; empty where no camera_info came
     registered: str = ""  # how depth was brought into the picture of colour; empty where it came so
     findings: tuple[Finding, ...] = ()  # where the stream is not as it says
@@ -50,6 +52,7 @@ class Run:
         """Note a frame as the segmenter made it."""
         self.detections += len(made.detections)
         self.objects += len(made.frame.objects)
+        self.field_of_view_deg = self.field_of_view_deg or field_of_view_deg(made.frame.view.intrinsics)
         self.lens = self.lens or made.lens
         self.registered = self.registered or made.seen.registered
         self.gravity_from[made.choice.source] += 1
@@ -63,6 +66,7 @@ class Run:
             "detections": self.detections,
             "objects": self.objects,
             "stream": [asdict(finding) for finding in self.findings],
+            "field_of_view_deg": None if self.field_of_view_deg is None else list(self.field_of_view_deg),
             "lens": self.lens,
             "mount_estimate": None if self.measured_mount is None else {"T_body_camera": self.measured_mount.tolist()},
             "registered": self.registered,
@@ -77,8 +81,14 @@ class Run:
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
             "truth": summarise(truth.errors(self.closures)),
             "refusals": [fields_of(rejected) for rejected in self.refusals],
-            "glimpses": self.glimpses,
+            "glimpses": self._glimpses(),
         }
+
+    def _glimpses(self) -> list[dict[str, Any]]:
+        """All frames; the outlines of those only that a constraint or a refusal names."""
+        pairs: list[LoopClosure | Rejected] = [*self.closures, *self.refusals]
+        named = {stamp_ns for pair in pairs for stamp_ns in (pair.from_ns, pair.to_ns)}
+        return [row if row["stamp_ns"] in named else {**row, "outlines": []} for row in self.glimpses]
 
     def gravity(self) -> dict[str, Any]:
         """Frames by source of gravity, how far IMU and picture are apart, and what of the IMU was not used."""
@@ -100,14 +110,17 @@ def constraint_with_error(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
 
 
 def glimpse(frame: Frame, labels: tuple[str, ...]) -> dict[str, Any]:
-    """A frame as JSON: when, from where, what was detected, and where in the camera the middle of each object is."""
+    """A frame as JSON: when, from where, what was detected, and where in the camera the middle of each object is.
+
+    ``outlines`` are those of the objects in the picture, as `outline` makes them.
+    """
+    seen = [item for item in frame.objects if len(item)]
     return {
         "stamp_ns": frame.stamp_ns,
         "T_odom_camera": None if frame.T_odom_camera is None else frame.T_odom_camera.tolist(),
         "labels": list(labels),
-        "objects": [
-            [o.label, np.median(o.xyz, axis=0).astype(float).round(4).tolist()] for o in frame.objects if len(o)
-        ],
+        "objects": [[o.label, np.median(o.xyz, axis=0).astype(float).round(4).tolist()] for o in seen],
+        "outlines": [outline(item.xyz, frame.view.intrinsics) for item in seen],
     }
 
 

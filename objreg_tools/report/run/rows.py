@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -18,6 +19,7 @@ from objreg_tools.report.run.camera_map import TrackedFrame
 Row = TypeVar("Row")
 
 MOST_NS = 1 << 63
+OUTLINE = re.compile(r"(\d{1,5},\d{1,5}( \d{1,5},\d{1,5}){2,})?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,7 @@ class Glimpse:
     labels: tuple[str, ...] = ()
     tracked: tuple[int, Array] | None = None  # without odometry: session and T_session_camera by our own tracking
     objects: tuple[tuple[str, Array], ...] = ()
+    outlines: tuple[str, ...] = ()  # of the objects, one each or none at all: `objreg_tools.offline.outlines`
 
     def pose(self, by_tracking: bool) -> tuple[int, Array] | None:
         """The session and ``T_session_camera`` of our own tracking, or of odometry; None where there is none."""
@@ -73,6 +76,7 @@ def glimpse_of(row: Mapping[str, Any]) -> Glimpse:
         labels=tuple(map(_spaced, row.get("labels", ()))),
         tracked=None if tracked is None else (int(tracked["session"]), _rigid(tracked["T_session_camera"], stamp_ns)),
         objects=tuple((_spaced(label), _place(xyz)) for label, xyz in row.get("objects", ())),
+        outlines=_outlines(row.get("outlines", ()), len(row.get("objects", ()))),
     )
 
 
@@ -90,6 +94,13 @@ def _place(xyz: Any) -> Array:
     if place.shape != (3,) or not np.isfinite(place).all():
         raise ValueError(f"expected three finite numbers, got {xyz}")
     return place
+
+
+def _outlines(rows: Sequence[str], count: int) -> tuple[str, ...]:
+    """The outlines of so many objects; ValueError for what would not be drawn."""
+    if len(rows) not in (0, count) or not all(OUTLINE.fullmatch(row) for row in rows):
+        raise ValueError(f"expected no outlines or {count}, each of corners u,v; got {str(rows)[:60]}")
+    return tuple(rows)
 
 
 def _rigid(pose: Any, stamp_ns: int) -> Array:

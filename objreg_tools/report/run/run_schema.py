@@ -52,6 +52,10 @@ def _is_mounting(value: Any) -> bool:
     return isinstance(value, list) and len(value) in (0, 7) and all(map(_is_number, value))
 
 
+def _is_field(value: Any) -> bool:
+    return value is None or (_is_pair(value) and all(0 < degrees < 180 for degrees in value))
+
+
 def _is_stage(value: Any) -> bool:
     return isinstance(value, dict) and all(_is_number(value.get(name)) for name in ("p50", "p95"))
 
@@ -85,6 +89,7 @@ FIELDS: dict[str, tuple[str, Check]] = {
     "about": ("an object of texts, model and params", _is_about),
     "name": ("text", _is_text),
     "lens": ("text", _is_text),
+    "field_of_view_deg": ("two angles or null", _is_field),
     "rectified": ("auto, all or none", lambda value: value in ("auto", "all", "none")),
     "inputs": ("an object of topics by input", _each(_is_text)),
     "camera": ("text", _is_text),

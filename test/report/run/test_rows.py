@@ -29,3 +29,12 @@ def test_rows_that_are_not_there_are_none_and_odd_ones_are_named() -> None:
     assert read_rows("walk", {}, "glimpses", glimpse_of) == ()
     with pytest.raises(ValueError, match="walk: expected glimpses as"):
         read_rows("walk", {"glimpses": [{"stamp_ns": 1, "tracked": {"session": 0}}]}, "glimpses", glimpse_of)
+
+
+def test_outlines_are_one_an_object_and_corners_only() -> None:
+    row = {"stamp_ns": 1, "objects": [["cup", [0.0, 0.0, 1.0]]], "outlines": ["1,2 30,4 5,600"]}
+    assert glimpse_of(row).outlines == ("1,2 30,4 5,600",)
+    assert glimpse_of({**row, "outlines": []}).outlines == ()
+    for bad in (["", ""], ["1,2"], ['1,2 3,4 5,6"/><script>']):
+        with pytest.raises(ValueError, match="outlines"):
+            glimpse_of({**row, "outlines": bad})

@@ -19,6 +19,8 @@ BAD: list[tuple[str, Any]] = [
     ("inputs", []),
     ("inputs", {"image": None}),
     ("T_base_camera", [1, 2]),
+    ("field_of_view_deg", [57]),
+    ("field_of_view_deg", [57, 180]),
     ("lens", None),
     ("rectified", "yes"),
     ("rectified", []),
