@@ -20,6 +20,7 @@ from objreg_tools.cli import NOTHING
 from objreg_tools.cli.paths import STANDARD_OUTPUT
 from objreg_tools.cli.verbosity import aside, is_verbose
 from objreg_tools.offline.run import Run
+from objreg_tools.report.closures.closed_revisits import ClosedRevisits
 from objreg_tools.report.run.findings import Counts, verdict
 
 STILL = "all frames have the stamp {} ns, so none closes a loop: record them again with the time in their headers"
@@ -127,12 +128,18 @@ def print_next(*command: str) -> None:
     click.echo(f"next: {shlex.join(command)}")
 
 
-def closing_lines(summary: Mapping[str, Any], findings: Sequence[Finding], out: Path, own: bool) -> Iterator[str]:
+def closing_lines(
+    summary: Mapping[str, Any],
+    findings: Sequence[Finding],
+    out: Path,
+    own: bool,
+    closed: ClosedRevisits | None = None,
+) -> Iterator[str]:
     """The end of a demo, whose files are in ``out``: whether it worked, how well, and what to do next.
 
-    ``own`` is whether the recording was the user's, not the simulated room.
+    ``own`` is whether the recording was the user's, not the simulated room; ``closed`` what its constraints close.
     """
-    yield verdict(summary, findings)
+    yield verdict(summary, findings, closed)
     yield f"Look at {out / 'report.html'}; the nodes' logs are in {out / 'logs'}."
     stopped = not summary["constraints"]
     if stopped and findings:

@@ -55,7 +55,7 @@ def _loaded(file: Path, stack: ExitStack) -> tuple[RunSummary, Album | None]:
     recording = with_camera(opened, summary.get("camera", ""), _inputs_of(summary, opened))
     inputs = choose_inputs(recording.topics, _inputs_of(summary, recording))
     T_base_camera = mounting(summary.get("T_base_camera", ()))
-    glimpses = _with_odometry(summary.get("glimpses", ()), recording, inputs.odom, T_base_camera)
+    glimpses = with_odometry(summary.get("glimpses", ()), recording, inputs.odom, T_base_camera)
     complete = {**_of_nodes(summary), **summary, "glimpses": glimpses}
     run = RunSummary.of(summary.get("name", place.resolve().name), complete, Truth.of(recording, inputs.ground_truth))
     return run, Album(recording, inputs, summary.get("rectified", "auto"))
@@ -70,7 +70,7 @@ def _inputs_of(summary: Mapping[str, Any], recording: Recording) -> dict[str, st
     return {name: topic if topic in recording.topics else "" for name, topic in inputs.items()}
 
 
-def _with_odometry(
+def with_odometry(
     glimpses: Sequence[Mapping[str, Any]], recording: Recording, topic: str | None, T_base_camera: Array | None
 ) -> list[Mapping[str, Any]]:
     """The frames of a run; those without a pose get the camera's pose by the recording's odometry.

@@ -19,7 +19,7 @@ from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers
 from objreg_ros.data.closure_fields import fields_of
 from objreg_ros.data.images import ColourImage, Intrinsics
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.geometry import quaternion_from_rotation
+from objreg_ros.geometry import mounting, quaternion_from_rotation
 from objreg_ros.registrar.params import RegistrarNodeParams
 from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_ros.whole_file import write_whole
@@ -37,10 +37,12 @@ from objreg_tools.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_tools.recording.mounts import TRANSFORMS, camera_on_body, first_frames
 from objreg_tools.recording.tf_odometry import with_transforms
 from objreg_tools.recording.troubles import FOLDER, troubles
+from objreg_tools.report.closures.closed_revisits import ClosedRevisits
 from objreg_tools.report.live_pictures import draw_sight, draw_trajectory
 from objreg_tools.report.run.about import about
 from objreg_tools.report.run.findings import as_json, find, setting
-from objreg_tools.report.write import write_report
+from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.report.write import with_odometry, write_report
 from objreg_tools.truth import Truth, summarise
 
 SIMULATED = {"registrar.covariance_calibration": "0.01", "detector.model": share.EMBEDDED}
@@ -107,7 +109,7 @@ def run(asked: DemoOptions) -> int:
         for note in truth.notes:
             _say(f"! {note}")
         summary = summary_of({**summary, "logs": str(logs.resolve())}, live, truth)
-        findings = find(summary, troubles(source, inputs))
+        findings, closed = find(summary, troubles(source, inputs)), closed_by(summary, source, inputs, truth)
         write_whole(asked.out / "demo.json", json.dumps({**summary, "findings": as_json(findings)}, indent=1))
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
@@ -119,8 +121,14 @@ def run(asked: DemoOptions) -> int:
         click.echo()
     live_table.require_balance(live, sent)
     notify(findings)
-    click.echo("\n".join(closing_lines(summary, findings, asked.out, own)))
+    click.echo("\n".join(closing_lines(summary, findings, asked.out, own, closed)))
     return exit_code(summary)
+
+
+def closed_by(summary: Mapping[str, Any], source: Recording, inputs: Inputs, truth: Truth) -> ClosedRevisits:
+    """What the constraints of the run close, by the recording's odometry or its truth."""
+    glimpses = with_odometry(summary["glimpses"], source, inputs.odom, mounting(summary["T_base_camera"]))
+    return RunSummary.of("demo", {**summary, "glimpses": glimpses}, truth).closed_revisits
 
 
 def begun_summary(asked: DemoOptions, recording: Path, source: Recording, inputs: Inputs) -> dict[str, Any]:

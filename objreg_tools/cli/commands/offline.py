@@ -86,10 +86,10 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
         print_run(run, summary)
         print_reasons(run.refusals)
         findings = find(summary, troubles(opened.source, opened.inputs))
-        click.echo(verdict(summary, findings))
-        notify(findings)
         run_summary = RunSummary.of(recording.name, summary, opened.truth)
         trajectory = run_summary.trajectory()
+        click.echo(verdict(summary, findings, run_summary.closed_revisits, trajectory))
+        notify(findings)
         print_trajectory(trajectory)
         write_json({**summary, "trajectory": trajectory, "findings": as_json(findings)})
         if outputs.wanted:

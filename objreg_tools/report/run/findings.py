@@ -18,12 +18,15 @@ from objreg_ros.plausibility.finding import Finding
 from objreg_tools.offline.run import Run
 from objreg_tools.recording.inputs import Inputs
 from objreg_tools.recording.record import Recording
+from objreg_tools.report.closures.closed_revisits import ClosedRevisits
 from objreg_tools.report.run.reasons import REFUSALS
+from objreg_tools.report.words import change, judgement, number_of
 
 MANY = 0.05  # of the frames of a node; fewer that are overtaken are usual
 SELDOM = 0.2  # of the frames; a model that knows what it sees finds more
 LATE_MS, LATE_SIGMAS = 45.0, 4.0  # cameras whose two pictures are taken in turn are up to a picture apart
 OVERTAKEN = "overtaken"
+SOURCES = {"odometry": "odometry", "tracked": "our own tracking"}  # of a trajectory, in words
 PASSED_OVER = tuple(reason.value for reason in (Reason.OVER_BUDGET, Reason.CLOCK, Reason.UNREADABLE))
 LOOK = "objreg inspect {recording}"
 FETCH = "get a model of real objects with `objreg fetch-model`, then run again"
@@ -265,23 +268,46 @@ def counted(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items(), key=lambda row: -row[1]))
 
 
-def number_of(count: int, noun: str) -> str:
-    """``1 loop``, ``2 loops``."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def verdict(summary: Mapping[str, Any], findings: Sequence[Finding] = ()) -> str:
-    """Whether the run worked and how well, in one line."""
+def verdict(
+    summary: Mapping[str, Any],
+    findings: Sequence[Finding] = (),
+    closed: ClosedRevisits | None = None,
+    trajectory: Mapping[str, Any] | None = None,
+) -> str:
+    """Whether the run worked and how well, in one line; ``trajectory`` as `RunSummary.trajectory` makes it."""
     counts, truth = Counts.of(summary), summary.get("truth", {})
     if not counts.frames:
         return "It did not work: no frame got through."
     if not counts.constraints:
         return f"No loop was closed: {findings[0].what}." if findings else "No loop was closed."
-    closed = f"{number_of(counts.constraints, 'loop')} closed in {number_of(counts.frames, 'frame')}"
-    if not truth.get("count"):
-        return f"It worked: {closed}; there is no truth to judge them by."
-    error = f"{truth['rotation_deg']['median']:.2f}° and {truth['translation_cm']['median']:.1f} cm off (median)"
-    wrong = truth["false"]
-    if not wrong:
-        return f"It worked: {closed}, none of {truth['count']} false, {error}."
-    return f"Not quite: {closed}, {wrong} of {truth['count']} false."
+    found = number_of(counts.constraints, "constraint") if closed is None else closed.text
+    judged = truth.get("count", 0)
+    parts = [
+        f"{found}, in {number_of(counts.frames, 'frame')}",
+        judgement(truth.get("false", 0), judged, counts.constraints) + (_off(truth) if judged else ""),
+        *_corrected(trajectory),
+    ]
+    return f"{_opening(closed, truth, trajectory)}: {'; '.join(parts)}."
+
+
+def _opening(closed: ClosedRevisits | None, truth: Mapping[str, Any], trajectory: Mapping[str, Any] | None) -> str:
+    """It worked where a revisit was closed, nothing is false and the trajectory is no worse for it."""
+    if truth.get("false"):
+        return "Not quite"
+    if closed is not None and not closed.revisits:
+        return "It is not known whether a loop was closed" if closed.unknown else "No loop was closed"
+    error = (trajectory or {}).get("error_cm")
+    return "Not quite" if error is not None and error["after"] > error["before"] else "It worked"
+
+
+def _off(truth: Mapping[str, Any]) -> str:
+    degrees, centimetres = truth["rotation_deg"]["median"], truth["translation_cm"]["median"]
+    return f", {degrees:.2f}° and {centimetres:.1f} cm off (median)"
+
+
+def _corrected(trajectory: Mapping[str, Any] | None) -> list[str]:
+    """Whether constraints made the trajectory better, where truth shows it."""
+    error = (trajectory or {}).get("error_cm")
+    if trajectory is None or error is None:
+        return []
+    return [f"the corrected trajectory is {change(error['before'], error['after'], SOURCES[trajectory['of']])}"]

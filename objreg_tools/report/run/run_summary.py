@@ -16,6 +16,8 @@ from objreg_mapper.pose_graph import PoseGraph
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.geometry import rigid_fit, transform
+from objreg_ros.registration.params import RegistrationParams
+from objreg_tools.report.closures.closed_revisits import FIELD_DEG, ClosedRevisits, Walk
 from objreg_tools.report.run.camera_map import TRACKED, CameraMap, with_sessions
 from objreg_tools.report.run.rows import Glimpse, advancing, closure_of, glimpse_of, read_rows, refusal_of
 from objreg_tools.report.run.trajectory_error import absolute_errors, root_mean_square
@@ -138,6 +140,27 @@ class RunSummary:
         """Whether a closure is wrong by truth; False where truth does not cover it."""
         error = self.error(closure)
         return error is not None and not within(error, FALSE)
+
+    @property
+    def least_odds(self) -> float:
+        """The least odds that the run asked for."""
+        params = self.summary.get("about", {}).get("params", {})
+        asked = params.get("registrar.least_odds", RegistrationParams().least_odds)
+        return float(asked) if isinstance(asked, int | float) else RegistrationParams().least_odds
+
+    @cached_property
+    def closed_revisits(self) -> ClosedRevisits:
+        """What the constraints close."""
+        field_deg = tuple(self.summary.get("field_of_view_deg") or FIELD_DEG)
+        return ClosedRevisits.of(self.closures, Walk(self.glimpses, self.by_tracking, field_deg, self.truth))
+
+    @cached_property
+    def _glimpse_at(self) -> dict[int, Glimpse]:
+        return {glimpse.stamp_ns: glimpse for glimpse in self.glimpses}
+
+    def glimpse_at(self, stamp_ns: int) -> Glimpse | None:
+        """The frame of a stamp; None where it is no frame's."""
+        return self._glimpse_at.get(stamp_ns)
 
     @cached_property
     def _labels_at(self) -> dict[int, tuple[str, ...]]:

@@ -13,9 +13,11 @@ from recording.sample_folders import records, tum_folder
 from objreg_ros.plausibility.finding import Finding
 from objreg_tools.recording import open_recording, write_rosbag2
 from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.report.closures.closed_revisits import ClosedRevisits
 from objreg_tools.report.run.findings import as_json, find, setting, verdict
 
 EMPTY: dict[str, Any] = {"frames": 40, "detections": 30, "objects": 20, "constraints": [], "rejected": {}}
+ONE = ClosedRevisits(revisits=((0,),))
 CLOSED = {**EMPTY, "constraints": [{}], "truth": {"count": 0}}
 
 
@@ -113,11 +115,34 @@ def test_what_the_recording_has_comes_after_where_the_run_stopped() -> None:
 def test_one_line_says_whether_it_worked() -> None:
     assert verdict({**EMPTY, "frames": 0}) == "It did not work: no frame got through."
     assert verdict(EMPTY, find(EMPTY)).startswith("No loop was closed: 20 objects in 40 frames")
-    assert verdict(CLOSED) == "It worked: 1 loop closed in 40 frames; there is no truth to judge them by."
-    assert verdict({**CLOSED, "constraints": [{}, {}]}).startswith("It worked: 2 loops closed in 40 frames;")
-    off = {"count": 1, "rotation_deg": {"median": 9.0}, "translation_cm": {"median": 4.0}}
-    assert "none of 1 false, 9.00° and 4.0 cm" in verdict({**CLOSED, "truth": {**off, "false": 0}})
-    assert verdict({**CLOSED, "truth": {**off, "false": 1}}).startswith("Not quite")
+    assert verdict(CLOSED, (), ONE) == (
+        "It worked: 1 revisit, closed by 1 constraint, in 40 frames; there is no truth to judge it by."
+    )
+    off = {"count": 2, "rotation_deg": {"median": 9.0}, "translation_cm": {"median": 4.0}}
+    three = {**CLOSED, "constraints": [{}, {}, {}]}
+    assert "none of the 2 that truth can judge is false; 1 could not be judged, 9.00° and 4.0 cm off" in verdict(
+        {**three, "truth": {**off, "false": 0}}, (), ONE
+    )
+    assert verdict({**three, "truth": {**off, "false": 1}}, (), ONE).startswith("Not quite")
+
+
+def test_a_camera_that_stayed_closed_no_loop_however_many_constraints_there_are() -> None:
+    stayed = ClosedRevisits(stayed=tuple(range(8)))
+    assert verdict({**CLOSED, "constraints": [{}] * 8}, (), stayed) == (
+        "No loop was closed: the camera never left: 8 constraints between keyframes of one place, 0 revisits, in 40 "
+        "frames; there is no truth to judge them by."
+    )
+    assert verdict(CLOSED, (), ClosedRevisits(unknown=(0,))).startswith("It is not known whether a loop was closed: ")
+
+
+def test_a_corrected_trajectory_that_is_worse_is_called_worse() -> None:
+    worse = {"of": "odometry", "error_cm": {"before": 1.0, "after": 1.11}}
+    said = verdict(CLOSED, (), ONE, worse)
+    assert said.startswith("Not quite: ") and said.endswith("the corrected trajectory is 11 % worse than odometry.")
+    better = {"of": "tracked", "error_cm": {"before": 2.0, "after": 1.0}}
+    said = verdict(CLOSED, (), ONE, better)
+    assert said.startswith("It worked: ") and "50 % better than our own tracking" in said
+    assert "trajectory" not in verdict(CLOSED, (), ONE, {"of": "odometry", "error_cm": None})
 
 
 @pytest.mark.parametrize(
