@@ -60,7 +60,7 @@ def test_a_run_with_nothing_in_space_does_not_carry_what_draws_it() -> None:
 
 def test_the_head_tells_of_false_constraints_and_of_the_error() -> None:
     text = page([(RunSummary.of("walk", summary(false=True), TRUTH), None)])
-    assert "truth finds 1 of them false" in text and "less than odometry" in text
+    assert "1 of the 5 is false." in text and "better than odometry" in text
     assert "no truth to judge" in page([(RunSummary.of("walk", summary(), Truth([])), None)])
 
 
@@ -86,7 +86,7 @@ def test_closures_of_two_runs_of_the_clock_are_left_out_of_the_map_and_counted()
     told = summary()
     told["constraints"] += [closure(90, 30), closure(95, 35)]
     text = page([(RunSummary.of("walk", told, TRUTH), None)])
-    assert "6 loops closed" in text and " 2 closures are left out: they tie two runs of the clock" in text
+    assert "closed by 6 constraints" in text and " 2 closures are left out: they tie two runs of the clock" in text
     assert "two runs of the clock" not in page([(RunSummary.of("walk", summary(), TRUTH), None)])
 
 

@@ -9,7 +9,9 @@ from functools import partial
 from typing import Any
 
 from objreg_ros.data.closures import UNTRIED
-from objreg_tools.report.run import clouds, figures, findings, thumbnails
+from objreg_tools.report.closures.matched_objects import Drawn, pair_drawing
+from objreg_tools.report.closures.weighed_evidence import EVIDENCE, weighed
+from objreg_tools.report.run import clouds, figures, thumbnails
 from objreg_tools.report.run.camera_map import of_one_clock
 from objreg_tools.report.run.clouds import Clouds
 from objreg_tools.report.run.pairs import ACCEPTED, PairRow, pairs_of
@@ -19,6 +21,7 @@ from objreg_tools.report.run.run_summary import RunSummary, Tracks
 from objreg_tools.report.run.scene import NAMES, scene
 from objreg_tools.report.run.thumbnails import Thumbnails
 from objreg_tools.report.run.trajectory_error import root_mean_square
+from objreg_tools.report.words import change, judgement, number_of
 
 View = dict[str, Any]
 
@@ -87,16 +90,17 @@ def _verdict(run: RunSummary) -> str:
         return f"No loop was closed{sure}."
     labels = [label for closure in run.closures for label in closure.labels]
     seen = ", ".join(sorted(set(labels), key=lambda label: -labels.count(label))[:5])
-    by = f" by {seen}" if seen else ""
+    by = f", by {seen}" if seen else ""
     false, of = judged(run)
-    truth = f"; truth finds {false or 'none'} of them false" if of else "; there is no truth to judge them by"
-    return f"{findings.number_of(len(run.closures), 'loop')} closed{by}{truth}."
+    found = run.closed_revisits.text
+    return f"{found[0].upper()}{found[1:]}{by}; {judgement(false, of, len(run.closures))}."
 
 
 def _tiles(run: RunSummary, tracks: Tracks | None) -> list[View]:
     false, of = judged(run)
     tiles = [
         _tile(f"{run.summary.get('frames', len(run.glimpses)):,}", "frames", _count_note(run)),
+        *_revisits_tile(run),
         _tile(f"{len(run.closures)}", "constraints", _refused_note(run)),
     ]
     if of:
@@ -105,8 +109,21 @@ def _tiles(run: RunSummary, tracks: Tracks | None) -> list[View]:
         )
     if tracks is not None and tracks.odometry_error is not None and tracks.corrected_error is not None:
         before, after = (100 * root_mean_square(e) for e in (tracks.odometry_error, tracks.corrected_error))
-        tiles.append(_tile(f"{before:.1f} → {after:.1f} cm", "trajectory error", _change(before, after, tracks.source)))
+        source = NAMES.get(tracks.source, tracks.source)
+        tone = "bad" if after > before else ""
+        tiles.append(
+            _tile(f"{before:.1f} → {after:.1f} cm", "trajectory error", f"RMS, {change(before, after, source)}", tone)
+        )
     return tiles
+
+
+def _revisits_tile(run: RunSummary) -> list[View]:
+    """How many revisits were closed; none where no constraint shows any and it is not known."""
+    closed = run.closed_revisits
+    if not closed.revisits and (closed.unknown or not run.closures):
+        return []
+    note = f"closed by {number_of(closed.closing, 'constraint')}" if closed.revisits else "the camera never left"
+    return [_tile(f"{len(closed.revisits)}", "revisits", note)]
 
 
 def _tile(value: str, name: str, note: str, tone: str = "") -> View:
@@ -127,15 +144,10 @@ def _count_note(run: RunSummary) -> str:
     return f"{run.summary['detections']:,} detections, {run.summary.get('objects', 0):,} objects"
 
 
-def _change(before: float, after: float, source: str) -> str:
-    share = 100 * (1 - after / before) if before > 0 else 0.0
-    return f"RMS, {abs(share):.0f} % {'less' if share >= 0 else 'more'} than {NAMES.get(source, source)}"
-
-
 def _trajectory_view(run: RunSummary, tracks: Tracks | None) -> View:
     """The drawings of the trajectory; of the truth without odometry, and of our own tracking without either."""
     if tracks is not None:
-        stamps_ns, lines, text = tracks.stamps_ns, tracks.lines, _trajectory_text(run)
+        stamps_ns, lines, text = tracks.stamps_ns, tracks.lines, _trajectory_text(run, tracks)
     elif (true := run.true_trajectory()) is not None:
         stamps_ns, lines = true[0], {"true": true[1]}
         text = "From above. There is no odometry in this run: the trajectory is the ground truth, and is not corrected."
@@ -165,9 +177,9 @@ def _in_both_widths(draw: Callable[[int], str], wide: int = figures.WIDE) -> Vie
     return {"wide": drawn, "narrow": draw(figures.NARROW)} if drawn else None
 
 
-def _trajectory_text(run: RunSummary) -> str:
+def _trajectory_text(run: RunSummary, tracks: Tracks) -> str:
     source = NAMES.get(run.source, run.source)
-    text = f"From above. Closures tie places that were seen twice; the pose graph takes the drift out of {source}."
+    text = f"From above. {_corrected(run, tracks, source)}"
     if run.by_tracking:
         text += f" {_pieces(run)}"
     if run.pruned:
@@ -180,6 +192,17 @@ def _trajectory_text(run: RunSummary) -> str:
     if across:
         text += f" {across} closures are left out: they tie two runs of the clock, and the map is of one."
     return text
+
+
+def _corrected(run: RunSummary, tracks: Tracks, source: str) -> str:
+    """What constraints make of the trajectory, and by truth whether it is better for them."""
+    if not run.closures:
+        return f"No constraint corrects {source}."
+    text = f"Constraints tie keyframes that saw the same place; the pose graph corrects {source} by them"
+    if tracks.odometry_error is None or tracks.corrected_error is None:
+        return f"{text}; there is no truth to say whether it is better for it."
+    before, after = map(root_mean_square, (tracks.odometry_error, tracks.corrected_error))
+    return f"{text}. By truth the corrected trajectory is {change(before, after, source)}."
 
 
 def _pieces(run: RunSummary) -> str:
@@ -224,7 +247,8 @@ def _browser(pairs: Sequence[PairRow], drawn: Thumbnails, album: Album | None) -
         "false": sum(pair.verdict == "false" for pair in pairs),
         "lacking": _lacking(drawn, len(pairs)) if album is not None else "There are no pictures of this run.",
         "data": {
-            "pairs": {pair.key: _pane(pair) for pair in pairs},
+            "pairs": {pair.key: _pane(pair, drawn.drawings.get(pair.key)) for pair in pairs},
+            "kinds": {name: [kind.text, kind.limit] for name, kind in EVIDENCE.items()},
             "moments": {str(stamp_ns): uri for stamp_ns, uri in drawn.moments.items()},
             "overlays": drawn.overlays,
         },
@@ -253,18 +277,31 @@ def _row(pair: PairRow) -> View:
     }
 
 
-def _pane(pair: PairRow) -> View:
-    """The text of the pane beside the pictures of a pair."""
+def _pane(pair: PairRow, drawn: Drawn | None) -> View:
+    """The text of the pane beside the pictures of a pair, what is drawn over these, and the evidence."""
+    evidence = weighed(pair.outcome.evidence, pair.run.least_odds)
     return {
+        "marks": drawn[:2] if drawn is not None and drawn.marks else None,
+        "lacking": _not_shown(drawn),
         "from": str(pair.outcome.from_ns),
         "to": str(pair.outcome.to_ns),
         "meaning": MEANINGS.get(pair.reason, ""),
         "text": pair.text,
-        "evidence": [
-            (name, f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}")
-            for name, value in pair.outcome.evidence.items()
-        ],
+        "evidence": [(row.key, row.value, _rounded(row.weight)) for row in evidence.readings],
+        "total": _rounded(evidence.total),
+        "least": _rounded(evidence.least),
     }
+
+
+def _not_shown(drawn: Drawn | None) -> str:
+    """Which objects closed a pair and are in neither picture."""
+    if drawn is None or not drawn.lacking:
+        return ""
+    return f"{', '.join(drawn.lacking)}: seen in other frames of the keyframes than these"
+
+
+def _rounded(weight: float | None) -> float | None:
+    return None if weight is None else round(weight, 3)
 
 
 def _lacking(drawn: Thumbnails, count: int) -> str:
@@ -302,9 +339,17 @@ def _card(pair: PairRow, album: Album) -> View | None:
     if first is None or second is None or first.rgb is None or second.rgb is None:
         return None
     pictures = [(data_uri(rgb), f"{s:.1f} s") for rgb, s in zip((first.rgb, second.rgb), pair.seconds, strict=True)]
-    if pair.outcome.T_from_to is not None:
-        pictures.append((data_uri(overlay(first, second, pair.outcome.T_from_to)), "laid over each other"))
-    return {**_row(pair), "text": pair.text, "pictures": pictures}
+    T_from_to = pair.outcome.T_from_to
+    over = None if T_from_to is None else data_uri(overlay(first, second, T_from_to))
+    drawn = pair_drawing(pair, first, second)
+    return {
+        **_row(pair),
+        "text": pair.text,
+        "pictures": pictures,
+        "over": over,
+        "drawn": drawn,
+        "lacking": _not_shown(drawn),
+    }
 
 
 def _objects(run: RunSummary) -> list[View]:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from objreg_ros.data.images import DepthImage
+from objreg_tools.report.closures.matched_objects import Drawn, pair_drawing
 from objreg_tools.report.run.pairs import PairRow, by_interest
 from objreg_tools.report.run.pictures import Album, data_uri, overlay
 
@@ -17,13 +18,14 @@ QUALITY = 70  # of a JPEG: half the bytes of what the galleries show
 
 @dataclass
 class Thumbnails:
-    """Data URIs: ``moments`` by stamp and ``overlays`` by the key of a pair.
+    """Data URIs: ``moments`` by stamp and ``overlays`` by the key of a pair; its objects in ``drawings``.
 
     ``lacking`` counts the pairs without pictures by why; ``left_out`` is how many had no place.
     """
 
     moments: dict[int, str] = field(default_factory=dict)
     overlays: dict[str, str] = field(default_factory=dict)
+    drawings: dict[str, Drawn] = field(default_factory=dict)
     lacking: Counter[str] = field(default_factory=Counter)
     left_out: int = 0
     size: int = 0
@@ -37,12 +39,14 @@ class Thumbnails:
         moments = self._new_moments({pair.outcome.from_ns: first, pair.outcome.to_ns: second})
         T_from_to = pair.outcome.T_from_to
         over = "" if T_from_to is None else data_uri(overlay(first, second, T_from_to), QUALITY)
-        size = sum(map(len, moments.values())) + len(over)
+        drawn = pair_drawing(pair, first, second)
+        size = sum(map(len, moments.values())) + len(over) + len(drawn.marks)
         if self.size + size > most_bytes:
             self.left_out += 1
             return
         self.size += size
         self.moments |= moments
+        self.drawings[pair.key] = drawn
         if over:
             self.overlays[pair.key] = over
 

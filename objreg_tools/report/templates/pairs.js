@@ -41,19 +41,77 @@ function browse(article) {
     body.append(...known, ...rows.filter((row) => isNaN(value(row))));
   }
 
-  function picture(figure, uri, caption) {
+  function picture(figure, uri) {
     figure.hidden = !uri;
     if (uri) figure.querySelector("img").src = uri;
-    if (caption) figure.querySelector("figcaption").textContent = caption;
   }
 
-  function listEvidence(numbers) {
-    part(".evidence").replaceChildren(...numbers.map(([name, value]) => {
-      const item = document.createElement("li"), label = document.createElement("span");
-      label.textContent = name;
-      item.append(label, value);
-      return item;
-    }));
+  const signed = (number) => (number < 0 ? "−" : "+") + Math.abs(number).toFixed(2);
+
+  // A bar from the middle: to the right what speaks for the pose, to the left what speaks against it.
+  function bar(weight, longest) {
+    const cell = document.createElement("td"), track = document.createElement("div");
+    cell.className = "weigh";
+    if (weight === null) return cell;
+    const fill = document.createElement("i"), number = document.createElement("span");
+    const width = 50 * Math.min(Math.abs(weight) / longest, 1);
+    fill.className = weight < 0 ? "against" : "for";
+    fill.style.width = width + "%";
+    fill.style.left = (weight < 0 ? 50 - width : 50) + "%";
+    number.textContent = signed(weight);
+    track.append(fill);
+    cell.append(track, number);
+    return cell;
+  }
+
+  function evidenceRow(texts, weight, longest, style) {
+    const row = document.createElement("tr");
+    row.className = style;
+    texts.forEach((text, k) => {
+      const cell = document.createElement("td");
+      cell.className = ["", "number", "less detail"][k];
+      cell.textContent = text;
+      row.append(cell);
+    });
+    row.append(bar(weight, longest));
+    return row;
+  }
+
+  // What was weighed, its sum, and below it the numbers that are only shown.
+  function listEvidence(pair) {
+    const kinds = data.kinds, numbers = pair.evidence;
+    const named = (key) => kinds[key] || [key, ""];
+    const longest = Math.max(...numbers.map(([, , weight]) => Math.abs(weight || 0)), 0.1);
+    const row = ([key, value, weight]) => evidenceRow([named(key)[0], value, named(key)[1]], weight, longest, "");
+    const isWeighed = ([, , weight]) => weight !== null;
+    const rows = numbers.filter(isWeighed).map(row);
+    if (pair.total !== null) {
+      const sum = evidenceRow(["the sum, log₁₀ of the odds", "", "≥ " + pair.least.toFixed(2)], pair.total,
+        Math.max(Math.abs(pair.total), pair.least), "sum");
+      rows.push(sum);
+    }
+    part(".evidence tbody").replaceChildren(...rows, ...numbers.filter((one) => !isWeighed(one)).map(row));
+    part(".evidence").hidden = numbers.length === 0;
+    part(".verdict-of").textContent = pair.total === null ? "" : "By the evidence there are "
+      + (10 ** pair.total).toPrecision(2) * 1 + " right poses for each false one like this; the gate asks for "
+      + Math.round(10 ** pair.least) + (pair.total < pair.least && numbers.some(([key]) => key === "agreeing")
+      ? ", and takes less where other keyframes agree" : "") + ". The bars add up to the logarithm of these odds;"
+      + " the bar of the sum has a scale of its own.";
+  }
+
+  function drawEnds(pair, seconds) {
+    const figure = part(".ends"), svg = figure.querySelector("svg");
+    const known = [data.moments[pair.from], data.moments[pair.to]];
+    figure.hidden = !known[0] && !known[1];
+    known.forEach((uri, k) => {
+      const image = figure.querySelector(["img.from", "img.to"][k]);
+      image.hidden = !uri;
+      if (uri) image.src = uri;
+    });
+    const [marks, height] = pair.marks || ["", 240];
+    svg.setAttribute("viewBox", "0 0 648 " + height);
+    svg.innerHTML = marks;
+    figure.querySelector("figcaption").textContent = seconds.join(" ↔ ") + (pair.lacking && ". " + pair.lacking);
   }
 
   function open(key) {
@@ -64,11 +122,10 @@ function browse(article) {
       + row.querySelector(".labels").textContent;
     part(".words").textContent = pair.text;
     part(".meaning").textContent = pair.meaning;
-    picture(part(".from"), data.moments[pair.from], seconds[0]);
-    picture(part(".to"), data.moments[pair.to], seconds[1]);
+    drawEnds(pair, seconds);
     picture(part(".over"), data.overlays[key]);
     part(".blind").hidden = Boolean(data.moments[pair.from] || data.moments[pair.to]);
-    listEvidence(pair.evidence);
+    listEvidence(pair);
     for (const link of article.querySelectorAll("[data-of]")) link.classList.toggle("chosen", link.dataset.of === key);
     if (!pane.open) pane.showModal();
     pane.dataset.pair = key;

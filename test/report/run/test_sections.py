@@ -5,11 +5,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+import pytest
+
+from objreg_ros.registration.gate.likelihood import log_odds
 from objreg_tools.report.page import page
 from objreg_tools.report.run.run_summary import RunSummary
 from objreg_tools.report.run.sections import view_of_run
 from objreg_tools.truth import Truth
-from report.runs import TRUTH, summary, tracked
+from report.run.test_thumbnails import Wall
+from report.runs import TRUE, TRUTH, closure, summary, tracked
 
 FINDING = {"what": "No image was read.", "cause": "All <malformed>.", "todo": "objreg inspect x", "anchor": "no-images"}
 
@@ -50,10 +55,63 @@ def test_a_run_with_findings_does_not_say_that_no_candidate_was_certain_enough()
     assert view({"frames": 0, "constraints": []})["said"] == "No loop was closed."
 
 
-def test_one_loop_is_counted_in_the_singular() -> None:
-    told = summary()
-    assert view({**told, "constraints": told["constraints"][:1]})["said"].startswith("1 loop closed by ")
-    assert view(told)["said"].startswith(f"{len(told['constraints'])} loops closed by ")
+def test_one_revisit_is_counted_in_the_singular_and_once() -> None:
+    stated = summary()
+    one = view({**stated, "constraints": stated["constraints"][:1]})["said"]
+    assert one.startswith("1 revisit, closed by 1 constraint, by ") and one.endswith("the only one is not false.")
+    said = view(stated)["said"]
+    assert said.startswith("1 revisit, closed by 4 constraints, by ") and said.endswith("none of the 4 is false.")
+
+
+def test_the_tiles_count_revisits_and_constraints_apart() -> None:
+    tiles = {tile["name"]: tile for tile in view(summary())["tiles"]}
+    assert (tiles["revisits"]["value"], tiles["revisits"]["note"]) == ("1", "closed by 4 constraints")
+    assert tiles["constraints"]["value"] == "4" and "better than odometry" in tiles["trajectory error"]["note"]
+    still = {**summary(), "glimpses": [{**row, "T_odom_camera": np.eye(4).tolist(), "objects": []}
+                                       for row in summary()["glimpses"]]}  # fmt: skip
+    stayed = view(still, Truth([]))
+    tiles = {tile["name"]: tile for tile in stayed["tiles"]}
+    assert (tiles["revisits"]["value"], tiles["revisits"]["note"]) == ("0", "the camera never left")
+    assert stayed["said"].startswith("The camera never left: 4 constraints between keyframes of one place, 0 revisits")
+
+
+def test_a_trajectory_that_is_worse_for_its_constraints_is_called_worse() -> None:
+    stated = summary()
+    stated["glimpses"] = [{**row, "T_odom_camera": T.tolist()} for row, T in zip(stated["glimpses"], TRUE, strict=True)]
+    stated["constraints"] = [
+        {**closure(k, k + 60, off=0.12), "covariance": np.diag([1e-6] * 6).tolist()} for k in (5, 20)
+    ]
+    shown = view(stated)
+    assert "% worse than odometry." in shown["trajectory"]["text"] and "drift out of" not in shown["trajectory"]["text"]
+    (tile,) = (tile for tile in shown["tiles"] if tile["name"] == "trajectory error")
+    assert "worse than odometry" in tile["note"] and tile["tone"] == "bad"
+
+
+def test_the_pane_of_a_pair_has_its_evidence_with_bars_that_add_up() -> None:
+    readings = {"correlation": 0.6, "matched": 2.0}
+    stated = summary()
+    stated["constraints"][0]["evidence"] = {**readings, "odds": 10.0 ** log_odds(readings)}
+    pane = view(stated)["pairs"]["data"]["pairs"]["c0"]
+    assert pane["total"] == pytest.approx(log_odds(readings), abs=1e-3)
+    assert sum(weight for *_, weight in pane["evidence"] if weight is not None) == pytest.approx(
+        pane["total"], abs=0.01
+    )
+    assert pane["least"] == pytest.approx(1.875, abs=1e-3)
+    stated["about"] = {"params": {"registrar.least_odds": 100.0}}
+    assert view(stated)["pairs"]["data"]["pairs"]["c0"]["least"] == 2.0
+
+
+def test_the_pictures_of_a_pair_show_what_closed_it() -> None:
+    stated = summary()
+    for row in stated["glimpses"]:
+        row["objects"] = [["cup", [0.1, 0.0, 2.0]]]
+        row["outlines"] = ["400,300 500,300 500,400"]
+    run = RunSummary.of("walk", {**stated, "constraints": [{**closure(5, 65), "labels": ["cup"]}]}, TRUTH)
+    shown = view_of_run(run, Wall())
+    marks = shown["pairs"]["data"]["pairs"]["c0"]["marks"][0]
+    assert marks.count(">cup</text>") == 2 and marks.count('<polygon class="mark m0"') == 2
+    assert shown["galleries"][0]["cards"][0]["drawn"].marks == marks
+    assert page([(run, Wall())]).count('class="both"') == 1 + sum(len(g["cards"]) for g in shown["galleries"])
 
 
 def test_without_odometry_the_truth_is_drawn() -> None:
