@@ -33,9 +33,7 @@ class Name(NamedTuple):
 EVIDENCE = {
     BEFORE: Name("before any evidence"),
     "tested": Name("pixels that both views see"),
-    "certain_violations": Name(
-        "certainly in seen free space", "% of pixels", f"≤ {100 * FREE_SPACE.certain:g} %", 100.0
-    ),
+    "certain_violations": Name("pixels certainly in seen free space", "%", f"≤ {100 * FREE_SPACE.certain:g} %", 100.0),
     "correlation": Name("the pictures agree (correlation)"),
     "silhouettes": Name("the objects' outlines agree, −1 to 1"),
     "matched": Name("objects on each other", "", "≥ 1 named, or 3"),
@@ -49,7 +47,7 @@ EVIDENCE = {
     "odds": Name("right poses for each false one (odds)"),
     "score": Name("view score V"),
     "inliers": Name("pixels whose depth agrees", "%", "", 100.0),
-    "violations": Name("in seen free space", "% of pixels", f"≤ {100 * FREE_SPACE.violations:g} %", 100.0),
+    "violations": Name("pixels in seen free space", "%", f"≤ {100 * FREE_SPACE.violations:g} %", 100.0),
     "occluded": Name("pixels hidden from the other view", "%", "", 100.0),
     "keypoints": Name("parts of the picture with agreeing keypoints"),
     "overlap": Name("points with a partner", "%", "", 100.0),
@@ -114,4 +112,5 @@ def _text(key: str, value: float | None) -> str:
     name = EVIDENCE.get(key, Name(key))
     scaled = value * name.scale
     number = f"{scaled:,.0f}" if abs(scaled) >= 1000 else f"{scaled:.3g}"
+    number = number.replace("-", "−")
     return f"{number}{'' if name.unit in ('', '°', '%') else ' '}{name.unit}"

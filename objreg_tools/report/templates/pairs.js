@@ -69,12 +69,22 @@ function browse(article) {
     row.className = style;
     texts.forEach((text, k) => {
       const cell = document.createElement("td");
-      cell.className = ["", "number", "less detail"][k];
+      cell.className = ["", "number", "detail"][k];
       cell.textContent = text;
       row.append(cell);
     });
     row.append(bar(weight, longest));
     return row;
+  }
+
+  // The odds in words, and what the gate asks for.
+  function oddsText(pair) {
+    const odds = 10 ** Math.abs(pair.total), count = odds < 10 ? odds.toFixed(1) : Number(odds.toPrecision(2));
+    const [many, one] = pair.total < 0 ? ["false", "right"] : ["right", "false"];
+    const late = pair.total < pair.least && pair.evidence.some(([key]) => key === "agreeing");
+    return "By the evidence there are " + count + " " + many + " poses for each " + one + " one like this; the gate asks for "
+      + Math.round(10 ** pair.least) + " right ones" + (late ? ", and for less where other keyframes agree" : "")
+      + ". The bars add up to the logarithm of the odds; that of the sum has a scale of its own.";
   }
 
   // What was weighed, its sum, and below it the numbers that are only shown.
@@ -92,11 +102,7 @@ function browse(article) {
     }
     part(".evidence tbody").replaceChildren(...rows, ...numbers.filter((one) => !isWeighed(one)).map(row));
     part(".evidence").hidden = numbers.length === 0;
-    part(".verdict-of").textContent = pair.total === null ? "" : "By the evidence there are "
-      + (10 ** pair.total).toPrecision(2) * 1 + " right poses for each false one like this; the gate asks for "
-      + Math.round(10 ** pair.least) + (pair.total < pair.least && numbers.some(([key]) => key === "agreeing")
-      ? ", and takes less where other keyframes agree" : "") + ". The bars add up to the logarithm of these odds;"
-      + " the bar of the sum has a scale of its own.";
+    part(".verdict-of").textContent = pair.total === null ? "" : oddsText(pair);
   }
 
   function drawEnds(pair, seconds) {
