@@ -261,9 +261,9 @@ def _name(text: str, x: float, top: float, side: int, style: str) -> Name:
 
 
 def _apart_from_each_other(names: Sequence[Name]) -> list[Name]:
-    """The names, each moved up until it covers none below it; at the upper edge they stay."""
+    """The names, each moved up until it covers none placed before, matches first; at the upper edge they stay."""
     placed: list[Name] = []
-    for name in sorted(names, key=lambda name: -name.y):
+    for name in sorted(names, key=lambda name: (name.style == "other", -name.y)):
         at = name
         while at.y > LINE and any(at.covers(other) for other in placed):
             at = at._replace(y=at.y - 1)

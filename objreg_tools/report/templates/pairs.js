@@ -107,7 +107,7 @@ function browse(article) {
 
   function drawEnds(pair, seconds) {
     const figure = part(".ends"), svg = figure.querySelector("svg");
-    const known = [data.moments[pair.from], data.moments[pair.to]];
+    const known = [data.moments[pair.from], pair.from === pair.to ? "" : data.moments[pair.to]];
     figure.hidden = !known[0] && !known[1];
     known.forEach((uri, k) => {
       const image = figure.querySelector(["img.from", "img.to"][k]);
@@ -117,7 +117,7 @@ function browse(article) {
     const [marks, height] = pair.marks || ["", 240];
     svg.setAttribute("viewBox", "0 0 648 " + height);
     svg.innerHTML = marks;
-    figure.querySelector("figcaption").textContent = seconds.join(" ↔ ") + (pair.lacking && ". " + pair.lacking);
+    figure.querySelector("figcaption").textContent = (pair.from === pair.to ? seconds[0] : seconds.join(" ↔ ")) + (pair.lacking && ". " + pair.lacking);
   }
 
   function open(key) {
