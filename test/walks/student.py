@@ -18,7 +18,7 @@ def walk(folder: Path, room: Path) -> None:
     assert "TUM RGB-D folder" in seen.text and "no odometry" in seen.text
 
     run = student.follow(seen)
-    assert "It worked: " in run.text and "; none of " in run.text
+    assert "the camera never left: " in run.text and "; none of the " in run.text
 
     shown = student.follow(run)
     assert "wrote report.html; open it in a browser" in shown.text

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often a camera came back to a place, by the constraints of a run and without truth.
+"""How often a camera came back to a place, by the constraints of a run; it needs no truth.
 
 A constraint closes a revisit where the camera had left the place between its two keyframes, else both are of one stay.
 Its place are the objects that both keyframes have in their pictures. It is left while less than a quarter of these lie
-in the picture, for a second at least, by odometry or by our own tracking. Drift moves a place: it counts as seen where
-either keyframe says so. Where no pose is known, the labels of the place must be absent from all detections for three
-seconds; what neither shows is not known.
+in the picture, for a second at least, by odometry or by our own tracking; by the truth where that covers every frame.
+Drift moves a place: it counts as seen where either keyframe says so. Where no pose is known, the labels of the place
+must be absent from all detections for three seconds; what neither shows is not known.
 
 A revisit is a stretch of time in which the camera is again at places that it had left, whatever they are tied to: the
 later ends of its constraints follow each other within five seconds, or the camera did not leave between them. So ten
@@ -96,14 +96,14 @@ class _End:
 
 
 class Walk:
-    """Where the camera was, and what it saw there."""
+    """Where the camera was, and what it saw there; by the ``truth`` if that covers every frame."""
 
     def __init__(
         self, glimpses: Sequence[Glimpse], by_tracking: bool, field_deg: Field = FIELD_DEG, truth: Truth | None = None
     ) -> None:
         self._glimpses = sorted(glimpses, key=lambda glimpse: glimpse.stamp_ns)
         self._stamps_ns = np.array([glimpse.stamp_ns for glimpse in self._glimpses], np.int64)
-        poses = [_pose(glimpse, by_tracking, truth) for glimpse in self._glimpses]
+        poses = _poses(self._glimpses, by_tracking, truth)
         self._sessions = np.array([-1 if pose is None else pose[0] for pose in poses])
         self._poses = np.array([np.eye(4) if pose is None else pose[1] for pose in poses]).reshape(-1, 4, 4)
         self._tangents = np.array([tan(radians(degrees) / 2) for degrees in field_deg])
@@ -179,13 +179,13 @@ class Walk:
         return np.array([not place or bool(place.intersection(self._glimpses[k].labels)) for k in between])
 
 
-def _pose(glimpse: Glimpse, by_tracking: bool, truth: Truth | None) -> tuple[int, Array] | None:
-    """The session and the pose of a frame by odometry or tracking; where the run has neither, by truth."""
-    known = glimpse.pose(by_tracking) or glimpse.tracked
-    if known is not None or truth is None:
-        return known
-    true = truth.at(glimpse.stamp_ns)
-    return None if true is None else (0, true)
+def _poses(glimpses: Sequence[Glimpse], by_tracking: bool, truth: Truth | None) -> list[tuple[int, Array] | None]:
+    """The session and the pose of each frame, None where neither odometry nor tracking knows it."""
+    true = [None if truth is None else truth.at(glimpse.stamp_ns) for glimpse in glimpses]
+    whole = [(0, T) for T in true if T is not None]
+    if len(whole) == len(glimpses):
+        return list(whole)
+    return [glimpse.pose(by_tracking) or glimpse.tracked for glimpse in glimpses]
 
 
 def _longest(holds: Array, stamps_ns: Array) -> int:
