@@ -161,7 +161,6 @@ class RegistrarNode(FramesNode):
             self.drop(seen.stamp_ns, "disabled")
 
     def _search(self, job: Job) -> None:
-        self.accounting.spend("wait", time.monotonic() - job.since)
         self.conclude(job.stamp_ns, lambda: self._find(job, "search", self._seconds))
 
     def _keep(self, job: Job) -> None:
@@ -171,6 +170,7 @@ class RegistrarNode(FramesNode):
         self.conclude(job.stamp_ns, lambda: self._find(job, "keep", 0.0))
 
     def _find(self, job: Job, stage: str, seconds: float) -> bool:
+        self.accounting.spend("wait", time.monotonic() - job.since)
         with self.accounting.timed(stage):
             outcome = self._outcome(job.seen, seconds)
         if outcome is None:

@@ -35,13 +35,14 @@ class CommonDiagnostics(Diagnostics):
     rate: float = reading("rate [Hz]", "What came in each second since the last report.", "Hz", "{:.2f}")
     median_ms: Mapping[str, float] = family(
         f"{LATENCY}<stage> p50 [ms]",
-        "The median duration of a stage of the work; `total` is from arrival until a frame's own work is done, "
-        "`keyframe` from there until the keyframe that it completed is done.",
+        "The median time that a stage takes of a frame that went out; `total` is from arrival until a frame's own work "
+        "is done, `keyframe` from there until the keyframe that it completed is done: `wait`, `search`, `keep` and "
+        "`pack` are part of that, where there is one, and all others of `total`.",
         "ms",
         "{:.2f}",
     )
     p95_ms: Mapping[str, float] = family(
-        f"{LATENCY}<stage> p95 [ms]", "The 95th percentile of the same durations, the last thousand.", "ms", "{:.2f}"
+        f"{LATENCY}<stage> p95 [ms]", "The 95th percentile of the same times, of the last thousand.", "ms", "{:.2f}"
     )
     state: str | None = reading("state", "Where a managed node is in its life cycle; absent of others.", default=None)
     connected: Mapping[str, int] = family(f"{CONNECTED}<topic>", "Those that an input is connected to.", "publishers")

@@ -295,6 +295,10 @@ class NodeBase(ServingNode):
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
         """Do the last work on a frame and settle it in the counters; what nobody expected drops it as a ``bug``."""
+        with self.accounting.working():
+            self._settle(stamp_ns, work)
+
+    def _settle(self, stamp_ns: int, work: Callable[[], bool]) -> None:
         try:
             done = work()
         except DroppedError as dropped:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from objreg_ros.bridge.node.accounting import Accounting, percentiles_ms
+from objreg_ros.bridge.node.accounting import Accounting, by_stage, percentiles_ms
 
 STEPS = st.lists(st.tuples(st.sampled_from(("receive", "publish", "overtaken", "malformed")), st.integers(0, 3)))
 
@@ -83,3 +83,47 @@ def test_a_stage_is_measured_and_the_way_from_in_to_out_too() -> None:
     accounting.publish(1)
     stages = accounting.balance().stage_ms
     assert set(stages) == {"detect", "total"} and 0 <= stages["detect"][0] <= stages["total"][1] < 10_000.0
+
+
+def test_no_stage_of_a_frame_takes_longer_than_its_total(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter(float(n) for n in range(1000))
+    monkeypatch.setattr("objreg_ros.bridge.node.accounting.time.perf_counter", lambda: next(clock))
+    accounting = Accounting()
+    for stamp_ns in range(20):
+        accounting.count_frame(stamp_ns)
+        with accounting.working():
+            for _ in range(1 + stamp_ns % 3):
+                with accounting.timed("decode"), accounting.timed("check"):
+                    pass
+            if stamp_ns % 4:
+                with accounting.timed("detect"):
+                    next(clock)
+            if stamp_ns % 5:
+                accounting.publish(stamp_ns)
+            else:
+                accounting.drop(stamp_ns, "refused")
+    stages = accounting.balance().stage_ms
+    assert set(stages) == {"decode", "detect", "total"} and stages["decode"] == pytest.approx((2000.0, 3000.0))
+    assert all(stages[stage][k] <= stages["total"][k] for stage in stages for k in (0, 1))
+
+
+def test_the_stages_of_a_keyframe_are_part_of_its_time_and_not_of_the_frames() -> None:
+    accounting = Accounting()
+    accounting.count_frame(5)
+    with accounting.working():
+        accounting.spend("track", 0.0)
+        accounting.hand_on(5)
+        accounting.spend("lost", 1.0)  # neither handed on nor published within
+    with accounting.working():
+        accounting.spend("search", 0.0)
+        with accounting.working():
+            accounting.publish(5)
+    assert set(accounting.balance().stage_ms) == {"track", "total", "search", "keyframe"}
+
+
+def test_a_stage_that_some_frames_do_without_takes_no_time_of_these() -> None:
+    assert by_stage([{"keep": 1.0, "keyframe": 3.0}, {"search": 2.0, "keyframe": 2.0}]) == {
+        "keep": [1.0, 0.0],
+        "keyframe": [3.0, 2.0],
+        "search": [0.0, 2.0],
+    }
