@@ -64,8 +64,8 @@ NODES: dict[str, Access] = {
     "registrar": MANAGED
     + Access(
         writes=(
-            *("transforms", "landmarks", *CLOSURES, "closure_refusals", "object_landmarks", "refusals", "markers"),
-            *("relocalised", "initialpose"),
+            *("transforms", "landmarks", *CLOSURES, "closure_refusals", "object_landmarks", "refusals", "acceptances"),
+            *("markers", "relocalised", "initialpose"),
         ),
         reads=FRAMES,
         serves=("~/relocalise", "~/reset", "~/save", "~/enable"),

@@ -19,7 +19,7 @@ from visualization_msgs.msg import MarkerArray
 
 from objreg_ros.bridge.messages import closures_msg, to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.diagnostics import refusals
+from objreg_ros.bridge.node.diagnostics import acceptances, refusals
 from objreg_ros.data.closures import LoopClosure, Observation, Rejected
 
 
@@ -33,6 +33,7 @@ class Announcements:
         self._node, self._robot = node, node.get_namespace().strip("/")
         self._constraints = node.create_publisher(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
         self._refusals = node.create_publisher(DiagnosticArray, "refusals", qos.stage(qos.REFUSALS))
+        self._acceptances = node.create_publisher(DiagnosticArray, "acceptances", qos.stage(qos.REFUSALS))
         self._transforms = node.create_publisher(TransformStamped, "transforms", qos.stage(depth=100))
         self._landmarks = node.create_publisher(PointCloud2, "landmarks", qos.stage(depth=100))
         self._markers = node.create_publisher(MarkerArray, "markers", qos.latched())
@@ -51,6 +52,9 @@ class Announcements:
                 self._transforms.publish(transform)
             if self._whole is not None:
                 self._whole.closures.publish(closures_msg.loop_closure(closure, self._robot))
+        if closures:
+            name, now = self._node.get_fully_qualified_name(), self._node.get_clock().now().to_msg()
+            self._acceptances.publish(acceptances(name, now, closures))
 
     def refusals(self, rejected: Sequence[Rejected]) -> None:
         """Publish the refusals; nothing where there are none."""

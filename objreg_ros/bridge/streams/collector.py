@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 from objreg_ros.bridge.messages import from_msg, headers
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.accounting import Balance
-from objreg_ros.bridge.node.diagnostics import REJECTED, balance_of, refusal_of
+from objreg_ros.bridge.node.diagnostics import REJECTED, accepted_of, balance_of, refusal_of
 from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.data.images import Detections
@@ -45,7 +45,8 @@ class Collector(Node):
         super().__init__("collector", context=context)
         self.counters: dict[str, Balance] = {}
         self.rejected: dict[str, int] = {}
-        self.closures: list[LoopClosure] = []
+        self._constraints: list[LoopClosure] = []
+        self._accepted: dict[tuple[int, int], dict[str, Any]] = {}  # stamps of a constraint → fields it does not carry
         self.refusals: list[Rejected] = []
         self.sight: LastDetections | None = None
         self.glimpses: dict[int, dict[str, Any]] = {}  # stamp → labels detected, middles of objects
@@ -58,10 +59,17 @@ class Collector(Node):
     def _listen(self) -> None:
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_counters, qos.stage(depth=100))
         self.create_subscription(DiagnosticArray, "refusals", self._on_refusals, qos.stage(depth=qos.REFUSALS))
+        self.create_subscription(DiagnosticArray, "acceptances", self._on_acceptances, qos.stage(depth=qos.REFUSALS))
         self.create_subscription(Odometry, "constraints", self._on_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
         self.create_subscription(String, "labels", self._on_labels, qos.latched())
         self.create_subscription(PointCloud2, "detections_table", self._on_detections, qos.stage())
         self.create_subscription(PointCloud2, "objects", self._on_objects, qos.stage())
+
+    @property
+    def closures(self) -> list[LoopClosure]:
+        """The constraints in the order in which they came, with the objects and the numbers behind them."""
+        return [replace(closure, **self._accepted.get((closure.from_ns, closure.to_ns), {}))
+                for closure in self._constraints]  # fmt: skip
 
     def spin_until(self, true: Callable[[], bool], seconds: float) -> bool:
         """Let messages come in until something is true or the time is over; whether it became true."""
@@ -93,8 +101,11 @@ class Collector(Node):
     def _on_refusals(self, message: DiagnosticArray) -> None:
         self.refusals += map(refusal_of, message.status)
 
+    def _on_acceptances(self, message: DiagnosticArray) -> None:
+        self._accepted.update(map(accepted_of, message.status))
+
     def _on_constraint(self, message: Any) -> None:
-        self.closures.append(from_msg.loop_closure(message))
+        self._constraints.append(from_msg.loop_closure(message))
 
     def _on_labels(self, message: Any) -> None:
         self._names = from_msg.labels(message)

@@ -9,8 +9,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.common import CommonDiagnostics
-from objreg_ros.bridge.node.diagnostics import balance_of, diagnostic, refusal_of, refusals
-from objreg_ros.data.closures import Reason, Rejected
+from objreg_ros.bridge.node.diagnostics import acceptances, accepted_of, balance_of, diagnostic, refusal_of, refusals
+from objreg_ros.data.closures import LoopClosure, ObjectMatch, Reason, Rejected
 from objreg_ros.diagnostics import Diagnostics, reading
 
 BOOKS = Balance(
@@ -58,3 +58,17 @@ def test_a_refusal_comes_back_with_its_reason_its_numbers_and_its_pose() -> None
     first, second = map(refusal_of, message.status)
     assert (first.reason, first.from_ns, first.to_ns, first.detail) == (Reason.SLACK, 5, 2**61, "sigma 0.1 m: no")
     assert np.array_equal(first.T_from_to, np.eye(4)) and second.T_from_to is None
+
+
+def test_the_numbers_of_a_refusal_and_the_objects_of_a_constraint_come_back_as_they_were() -> None:
+    numbers = {"score": 0.1 + 0.2, "moved cup [m]": 1e-9}
+    refused = Rejected(reason=Reason.SLACK, from_ns=5, to_ns=6, detail="no", evidence=numbers)
+    assert refusal_of(refusals("/registrar", Time(), [refused]).status[0]).evidence == numbers
+    cup = ObjectMatch(label="cup", object_id=4)
+    closure = LoopClosure(
+        from_ns=5, to_ns=2**61, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup", "cup"), objects=(cup,),
+        evidence=numbers,
+    )  # fmt: skip
+    (sent,) = acceptances("/registrar", Time(sec=4), [closure]).status
+    assert (sent.name, sent.message) == ("/registrar: constraint", "cup")
+    assert accepted_of(sent) == ((5, 2**61), {"labels": ("cup", "cup"), "objects": (cup,), "evidence": numbers})

@@ -21,7 +21,7 @@ from objreg_ros.data.closures import LoopClosure, Observation, Reason, Rejected
 CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",), to_session=1)
 REJECTED = Rejected(reason=Reason.NO_CANDIDATE, from_ns=9, to_ns=9, detail="none of 3")
 SEEN = (Observation(label="cup", object_id=4, xyz=np.array([0.0, 0.0, 1.0])),)
-COMMON = {"constraints", "landmarks", "markers", "refusals", "transforms"}
+COMMON = {"acceptances", "constraints", "landmarks", "markers", "refusals", "transforms"}
 WHOLE = {"closure_refusals", "loop_closures", "object_landmarks"}
 
 
