@@ -15,9 +15,11 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
-PAGES = ("ARCHITECTURE.md", "CHANGELOG.md", "QUALITY_DECLARATION.md", "models/README.md")
+PAGES = (".github/SECURITY.md", "ARCHITECTURE.md", "CHANGELOG.md", "QUALITY_DECLARATION.md", "models/README.md")
 OUTSIDE = "project"  # where the site has what stands outside docs/
 INSTEAD = {"README.md": "docs/index.md"}  # what has a page of its own for the site
+GITHUB = ".github/"  # of a name with a dot MkDocs makes no page
+OF_GITHUB = {name.removeprefix(GITHUB): name for name in PAGES if name.startswith(GITHUB)}
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#)([^)\s#]+)(?=[)#])")
 FENCED = re.compile(r"(```.*?```)", re.DOTALL)
 
@@ -60,12 +62,12 @@ def target(here: str, link: str) -> str:
 def in_repository(src_uri: str) -> str:
     """Where the repository has what the site has at ``src_uri``."""
     head, _, rest = src_uri.partition("/")
-    return rest if head == OUTSIDE else f"docs/{src_uri}"
+    return OF_GITHUB.get(rest, rest) if head == OUTSIDE else f"docs/{src_uri}"
 
 
 def in_site(name: str) -> str:
     """Where the site has a file of the repository."""
-    return name.removeprefix("docs/") if name.startswith("docs/") else f"{OUTSIDE}/{name}"
+    return name.removeprefix("docs/") if name.startswith("docs/") else f"{OUTSIDE}/{name.removeprefix(GITHUB)}"
 
 
 def _add(files: Files, config: MkDocsConfig, name: str) -> None:

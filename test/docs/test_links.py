@@ -17,6 +17,7 @@ from docs.links import in_repository, in_site, links, target
         ("CHANGELOG.md", "docs/own-detector.md", "own-detector.md"),
         ("models/README.md", "../docs/models-contract.md", "models-contract.md"),
         ("docs/wire.md", "../README.md", "index.md"),
+        ("QUALITY_DECLARATION.md", ".github/SECURITY.md", "project/SECURITY.md"),
     ],
 )
 def test_a_link_leads_to_where_the_site_has_its_file(here: str, link: str, there: str) -> None:
@@ -25,6 +26,7 @@ def test_a_link_leads_to_where_the_site_has_its_file(here: str, link: str, there
 
 def test_a_page_of_the_site_knows_its_file_in_the_repository() -> None:
     assert in_repository("project/models/README.md") == "models/README.md"
+    assert in_repository("project/SECURITY.md") == ".github/SECURITY.md"
     assert in_repository("tutorials/tune.md") == "docs/tutorials/tune.md"
 
 
