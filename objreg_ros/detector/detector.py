@@ -20,6 +20,7 @@ from objreg_ros.detector.picture import Picture
 from objreg_ros.detector.recognise import recognise
 from objreg_ros.detector.runtime import Runtime
 from objreg_ros.detector.tf_detection import TfDetection
+from objreg_ros.detector.threshold import own_threshold
 
 
 class Detector:
@@ -31,6 +32,7 @@ class Detector:
 
     def __init__(self, params: DetectorParams, model_path: Path, labels_path: Path | None = None):
         self.params = params
+        self._own_threshold = own_threshold(Path(model_path))
         self._runtime = Runtime(Path(model_path), params.threads)
         runtime = self._runtime
         self._picture = Picture.of(runtime.inputs, runtime.metadata)
@@ -52,13 +54,18 @@ class Detector:
         labels = Path(params.labels).expanduser() if params.labels else None
         return cls(params, find_model(params.model), labels)
 
+    @property
+    def threshold(self) -> float:
+        """The least score of a detection: that of the parameters, or the model's own."""
+        return self.params.threshold or self._own_threshold
+
     def detect(self, image: ColourImage) -> Detections:
         """What is in ``image``, best first; no detections (N = 0) when nothing reaches the threshold."""
         height, width = image.rgb.shape[:2]
         if height == 0 or width == 0:
             raise ValueError(f"image: expected at least one pixel, got {width} x {height}")
         outputs = self._run(image.rgb, self._contract.names)
-        candidates = self._contract.read(outputs, self.params.threshold)
+        candidates = self._contract.read(outputs, self.threshold)
         place = self._picture.place(image.rgb)
         xyxy = clip(place.to_image(candidates.xyxy), height, width).astype(np.float32)
         chosen = self._choose(xyxy, candidates, height * width)

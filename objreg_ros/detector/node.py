@@ -41,6 +41,8 @@ class DetectorNode(NodeBase):
         """Load the model, publish its labels, and subscribe."""
         params = self.settings.of(DetectorParams)
         self._detector = Detector.of(params, share.model)
+        whose = "as set" if params.threshold else "the model's own"
+        self.get_logger().info(f"{share.model(params.model).name}, threshold {self._detector.threshold:g} ({whose})")
         self._rate_limit, self._order = RateLimit(params.max_rate), FrameOrder(self._leave_out)
         self._names = dict(enumerate(self._detector.labels))
         self._table = self.offer(PointCloud2, "detections_table", qos.stage())

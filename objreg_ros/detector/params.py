@@ -28,7 +28,9 @@ class DetectorParams(Params):
         "auto", "what the model's outputs mean; auto: by their names and shapes and the number of labels",
         choices=("auto", "tf_detection", "ssd_raw", "yolov5", "yolov8", "end_to_end", "yolox", "nanodet", "detr"),
     )  # fmt: skip
-    threshold: float = param(0.5, "least score of a detection", ge=0.0, le=1.0, live=True)
+    threshold: float = param(
+        0.0, "least score of a detection; 0: that of the model, 0.5 where it says none", ge=0.0, le=1.0, live=True
+    )
     nms_iou: float = param(0.5, "two boxes of one label that overlap more are one object", ge=0.0, le=1.0, live=True)
     cross_label_iou: float = param(
         0.85, "two boxes of different labels that overlap more are one object; the better label wins", ge=0.0, le=1.0,

@@ -15,6 +15,7 @@ import click
 
 from objreg_ros import share
 from objreg_ros.detector.runtime import Runtime
+from objreg_ros.detector.threshold import own_threshold
 from objreg_tools.cli.download import download
 from objreg_tools.cli.paths import OutputPath
 
@@ -27,7 +28,10 @@ MIRRORS = (
 
 @dataclass(frozen=True)
 class ModelSource:
-    """A file that several places offer: its name here, its SHA-256 where it is known, the labels it needs."""
+    """A file that several places offer: its name here, its SHA-256 where it is known, the labels it needs.
+
+    Beside the labels is its threshold, as JSON.
+    """
 
     file: str
     urls: tuple[str, ...]
@@ -66,7 +70,9 @@ def command(what: str, sha256: str, folder: Path | None) -> None:
     else:
         fetch(source, path)
     if source.labels:
-        shutil.copyfile(share.find(source.labels), path.with_suffix(".txt"))
+        for end in (".txt", ".json"):
+            shutil.copyfile(share.find(source.labels).with_suffix(end), path.with_suffix(end))
+    click.echo(f"its threshold is {own_threshold(path):g}, unless detector.threshold is set")
     click.echo(f"use it with: --model {path.name}" if folder is None else f"use it with: --model {path}")
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from objreg_ros import share
+from objreg_ros.detector.threshold import own_threshold
 
 DIGITS = 12  # of a commit and of a model's digest: enough to distinguish them
 PATIENCE_S = 5.0  # for git
@@ -30,7 +31,11 @@ def about(recording: Path, model: str, params: Mapping[str, Any], arguments: Seq
         "command": shlex.join(["objreg", *arguments]),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "recording": str(recording.resolve()),
-        "model": {"name": file.name, "sha256": sha256(file.read_bytes()).hexdigest()[:DIGITS]},
+        "model": {
+            "name": file.name,
+            "sha256": sha256(file.read_bytes()).hexdigest()[:DIGITS],
+            "threshold": params.get("detector.threshold") or own_threshold(file),
+        },
         "params": dict(params),
     }
 

@@ -73,10 +73,15 @@ def about_rows(about: Mapping[str, Any]) -> list[tuple[str, str]]:
         "version": " ".join(filter(None, (about.get("version"), about.get("commit")))),
         "date": about.get("date"),
         "recording": about.get("recording"),
-        "model": f"{model.get('name')} (sha256 {model.get('sha256')}…)" if model else "",
+        "model": _model_text(model) if model else "",
         "not the defaults": ", ".join(f"{name} = {value}" for name, value in about.get("params", {}).items()),
     }
     return [(name, str(text)) for name, text in rows.items() if text]
+
+
+def _model_text(model: Mapping[str, Any]) -> str:
+    text = f"{model.get('name')} (sha256 {model.get('sha256')}…)"
+    return f"{text}, threshold {model['threshold']}" if "threshold" in model else text
 
 
 def _said(run: RunSummary) -> str:

@@ -21,7 +21,8 @@ def test_a_run_tells_what_it_was_made_with(tmp_path: Path) -> None:
     )
     assert told["command"] == "objreg offline 'my room' --json x" and told["recording"] == str(tmp_path)
     digest = hashlib.sha256(b"weights").hexdigest()
-    assert told["model"] == {"name": "cups.onnx", "sha256": digest[:12]}
+    assert told["model"] == {"name": "cups.onnx", "sha256": digest[:12], "threshold": 0.4}
+    assert about(tmp_path, str(tmp_path / "cups.onnx"), {}, [])["model"]["threshold"] == 0.5
     assert told["params"] == {"detector.threshold": 0.4} and json.loads(json.dumps(told)) == told
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", told["date"])
 
