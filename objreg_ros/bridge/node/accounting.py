@@ -175,7 +175,7 @@ def _pop(times: dict[int, list[float]], stamp_ns: int) -> float | None:
     return first
 
 
-def percentiles_ms(seconds: deque[float] | list[float]) -> tuple[float, float]:
+def percentiles_ms(seconds: Iterable[float]) -> tuple[float, float]:
     """The median and the 95th percentile in milliseconds."""
     p50, p95 = np.percentile(np.fromiter(seconds, float), (50, 95)) * 1e3
     return float(p50), float(p95)
