@@ -8,6 +8,7 @@ from typing import Any
 
 from objreg_ros.bridge.node.accounting import Balance
 from objreg_tools.cli.live import STAGES, Live
+from objreg_tools.report.stage_times import in_order
 
 
 def lines(live: Live, sent: Mapping[str, int], truth: Mapping[str, Any]) -> Iterator[str]:
@@ -19,7 +20,7 @@ def lines(live: Live, sent: Mapping[str, int], truth: Mapping[str, Any]) -> Iter
     for node in STAGES:
         yield _frames(node, sent[node], live.counters[node])
     yield ""
-    yield f"{'latency':<12}{'stage':<12}{'p50 ms':>9}{'p95 ms':>9}"
+    yield f"{'latency':<12}{'stage':<18}{'p50 ms':>9}{'p95 ms':>9}"
     for node in STAGES:
         yield from _latencies(node, live.counters[node])
     yield ""
@@ -40,8 +41,8 @@ def _counts(counts: Mapping[str, int]) -> str:
 
 
 def _latencies(node: str, counters: Balance) -> Iterator[str]:
-    for stage, (p50, p95) in sorted(counters.stage_ms.items(), key=lambda item: item[0] == "total"):
-        yield f"{node:<12}{stage:<12}{p50:>9.1f}{p95:>9.1f}"
+    for part, stage, (p50, p95) in in_order(counters.stage_ms):
+        yield f"{node:<12}{f'{stage}{part}':<18}{p50:>9.1f}{p95:>9.1f}"
 
 
 def _errors(truth: Mapping[str, Any]) -> str:

@@ -55,6 +55,7 @@ class RecordedOptions:
     odometry: str | None = None
     max_frames: int | None = None
     detections: str | None = None  # a topic in place of the detector
+    seconds: float | None = None  # of the recording from its start; None: all
 
     @classmethod
     def of(
@@ -74,6 +75,10 @@ class RecordedOptions:
         named = {"detector.model": model, "detector.labels": labels, "segmenter.camera": camera}
         by_option = [f"{name}={value}" for name, value in named.items() if value]
         return cls(read_settings(params_file, [*changes, *by_option]), remaps, odometry, max_frames, detections)
+
+    def until(self, seconds: float | None) -> RecordedOptions:
+        """The same of only so many seconds of a recording, of all of it where None."""
+        return replace(self, seconds=seconds)
 
     @property
     def drifts(self) -> bool:
@@ -217,7 +222,9 @@ class Opened:
     def _records(self) -> Iterator[Record]:
         recorded = self.recorded.topics if self.recorded else {}
         topics = {*self.inputs.chosen().values(), *moving_topics(self.source), *recorded}
-        records = self.source.records(topics)
+        seconds = self.asked.seconds
+        end_ns = None if seconds is None else self.source.start_ns + round(seconds * 1e9)
+        records = self.source.records(topics, end_ns=end_ns)
         if not self.asked.drifts or self.inputs.ground_truth is None:
             return records
         seed = int(str(self.asked.odometry).removeprefix(DRIFT))

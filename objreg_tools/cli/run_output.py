@@ -139,7 +139,7 @@ def closing_lines(
 
     ``own`` is whether the recording was the user's, not the simulated room; ``closed`` what its constraints close.
     """
-    yield verdict(summary, findings, closed)
+    yield f"With every frame: {verdict(summary, findings, closed)}"
     yield f"Look at {out / 'report.html'}; the nodes' logs are in {out / 'logs'}."
     stopped = not summary["constraints"]
     if stopped and findings:

@@ -18,10 +18,10 @@ from objreg_tools.report.run.sections import view_of_run
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def page(loaded: Sequence[tuple[RunSummary, Album | None]]) -> str:
+def page(loaded: Sequence[tuple[RunSummary, Album | None]], compared_last: bool = False) -> str:
     """The HTML of a report, one section a run; one without an album has no pictures.
 
-    More runs than one are compared before them.
+    More runs than one are compared before them; with ``compared_last`` after them.
     """
     bundle = plotly_bundle()
     views = [view_of_run(run, album, len(loaded), spatial=bool(bundle)) for run, album in loaded]
@@ -30,7 +30,7 @@ def page(loaded: Sequence[tuple[RunSummary, Album | None]]) -> str:
         view["letter"] = name
     template = environment().get_template("page.html.j2")
     title = ", ".join(view["name"] for view in views)
-    return template.render(title=title, runs=views, compared=compared, bundle=bundle)
+    return template.render(title=title, runs=views, compared=compared, compared_last=compared_last, bundle=bundle)
 
 
 @cache

@@ -25,20 +25,23 @@ from objreg_tools.report.page import page
 from objreg_tools.report.run.pictures import Album
 from objreg_tools.report.run.run_schema import require_form
 from objreg_tools.report.run.run_summary import RunSummary
+from objreg_tools.report.stage_times import in_order
 from objreg_tools.truth import Truth
 
 ODOMETRY_SLOP_NS = 20_000_000  # as the registrar's default
 
 
-def write_report(out: Path, runs: Sequence[Path]) -> list[str]:
+def write_report(out: Path, runs: Sequence[Path], compared_last: bool = False) -> list[str]:
     """Write one page about runs from the files of `objreg offline --json`, or of `objreg demo`.
+
+    Several runs are compared before them; with ``compared_last`` after them.
 
     The recording that a run names gives truth and pictures. Where it is gone, the page does without; the result has one
     line for each such run. ValueError for a file that is no run.
     """
     with ExitStack() as stack:
         loaded = [_loaded(file, stack) for file in runs]
-        text = page(loaded)
+        text = page(loaded, compared_last)
     write_whole(out, text)
     lacking = [file for file, (_, album) in zip(runs, loaded, strict=True) if album is None]
     return [
@@ -100,9 +103,9 @@ def _of_nodes(summary: Mapping[str, Any]) -> dict[str, Any]:
     """The counters of live nodes: how many frames, and how long each stage took."""
     nodes = summary.get("nodes", {})
     stages = {
-        f"{node}: {stage}": {"p50": p50, "p95": p95}
+        f"{node}{part}: {stage}": {"p50": p50, "p95": p95}
         for node, counters in nodes.items()
-        for stage, (p50, p95) in counters["stage_ms"].items()
+        for part, stage, (p50, p95) in in_order(counters["stage_ms"])
     }
     return {"frames": nodes["segmenter"]["published"], "stage_ms": stages} if "segmenter" in nodes else {}
 

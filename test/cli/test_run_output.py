@@ -37,7 +37,10 @@ def test_a_run_without_frames_has_an_exit_code_of_its_own() -> None:
 def test_the_last_lines_say_whether_it_worked_where_to_look_and_what_to_do() -> None:
     run = {"frames": 9, "constraints": [], "detections": 0}
     failed = list(closing_lines(run, [FINDING], Path("out"), own=True))
-    assert failed[0] == "No loop was closed: nothing is seen." and failed[-1] == "Next: put on the light."
+    assert (
+        failed[0] == "With every frame: No loop was closed: nothing is seen."
+        and failed[-1] == "Next: put on the light."
+    )
     assert "out/report.html" in failed[1] and "out/logs" in failed[1]
     assert "YOUR_RECORDING" in list(closing_lines({**run, "constraints": [{}]}, [], Path("out"), own=False))[-1]
 

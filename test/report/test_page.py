@@ -120,3 +120,10 @@ def test_the_head_says_what_was_assumed_of_the_lens() -> None:
     told = {**summary(), "lens": "plumb_bob, moves a pixel by 4.8 px (median), 36.8 at most; rectified"}
     assert "Lens: plumb_bob, moves a pixel by 4.8 px" in page([(RunSummary.of("walk", told, TRUTH), None)])
     assert "Lens:" not in page([(RunSummary.of("walk", summary(), TRUTH), None)])
+
+
+def test_runs_are_compared_before_them_or_after_them() -> None:
+    two = [(RunSummary.of(name, summary(), TRUTH), None) for name in ("first", "second")]
+    before, after = page(two), page(two, compared_last=True)
+    assert before.index("<h1>Comparison</h1>") < before.index("<h1>first</h1>")
+    assert after.index("<h1>first</h1>") < after.index("<h1>second</h1>") < after.index("<h1>Comparison</h1>")

@@ -69,7 +69,7 @@ def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[RunSummary] = []
-    monkeypatch.setattr("objreg_tools.report.write.page", lambda loaded: told.append(loaded[0][0]) or "")
+    monkeypatch.setattr("objreg_tools.report.write.page", lambda loaded, last: told.append(loaded[0][0]) or "")
     write_rosbag2(tmp_path / "bag", records(3))
     rows = [{"stamp_ns": record.stamp_ns, "labels": [], "objects": []} for record in records(3)][::4]
     mounted = [0.3, 0.0, 1.1, -0.5, 0.5, -0.5, 0.5]  # looks ahead: optical z is the body's x

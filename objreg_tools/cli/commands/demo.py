@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`objreg demo`: a recording through the live graph, at its real rate, with a table and pictures at the end."""
+"""`objreg demo`: every frame of a recording, then the live graph at its real rate; a page, a table and pictures."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from objreg_tools.cli.paths import OutputPath, RecordingPath
 from objreg_tools.cli.played import as_rosbag2, simulated_room
 from objreg_tools.cli.run_output import closing_lines, exit_code, notify, print_reasons
 from objreg_tools.cli.settings import parse_change, print_ignored, read_settings, ros_argument
+from objreg_tools.cli.unhurried import run_unhurried
 from objreg_tools.cli.verbosity import aside
 from objreg_tools.offline.run import constraint_with_error
 from objreg_tools.recording import Recording, open_recording
@@ -40,7 +41,7 @@ from objreg_tools.recording.troubles import FOLDER, troubles
 from objreg_tools.report.closures.closed_revisits import ClosedRevisits
 from objreg_tools.report.live_pictures import draw_sight, draw_trajectory
 from objreg_tools.report.run.about import about
-from objreg_tools.report.run.findings import as_json, find, setting
+from objreg_tools.report.run.findings import as_json, find, setting, verdict
 from objreg_tools.report.run.run_summary import RunSummary
 from objreg_tools.report.write import with_odometry, write_report
 from objreg_tools.truth import Truth, summarise
@@ -76,7 +77,7 @@ class DemoOptions:
 @options.remap
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Play only this many seconds.")
 @click.option("--rate", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="Speed.")
-@click.option("--lossless", is_flag=True, help="Wait for every frame instead of keeping the pace.")
+@click.option("--lossless", is_flag=True, help="Live too, wait for every frame instead of keeping the pace.")
 @click.option(
     "--out",
     type=OutputPath(file_okay=False, path_type=Path),
@@ -85,7 +86,10 @@ class DemoOptions:
     help="Where everything is written.",
 )
 def command(**asked: Any) -> int:
-    """Play RECORDING (or a simulated room) through three live nodes and show what came out.
+    """Run RECORDING (or a simulated room), then play it through three live nodes, and show what came out of both.
+
+    The first run takes every frame, without ROS, as `objreg offline` does: what the recording gives where there is time
+    for all of it. The live one keeps the pace of the recording, and leaves out what the machine is too slow for.
 
     Ends with the counters of every node, latencies, constraints and their true error, and with pictures in the folder
     of --out. The inputs of a recording that is no rosbag2 are written as one first. The last lines report whether it
@@ -101,6 +105,12 @@ def run(asked: DemoOptions) -> int:
     recording = asked.recording or simulated_room(asked.out)
     inputs, camera = _inputs(recording, asked), camera_asked(asked)
     bag = as_rosbag2(recording, inputs, asked.out, asked.seconds)
+    page, name = asked.out / "report.html", recording.resolve().name
+    given = asked.model, asked.labels, camera, asked.params_file, asked.changes, inputs.outright, asked.seconds
+    first = run_unhurried(bag, name, *given)
+    files = [_write_json(asked.out / "every_frame.json", first.json)]
+    write_report(page, files)
+    _say(f"wrote {page}; the same live now, which comes below it")
     with open_recording(bag) as opened:
         source = with_transforms(with_camera(opened, camera, inputs.outright))
         logs, summary = asked.out / "logs", begun_summary(asked, recording, source, inputs)
@@ -110,18 +120,19 @@ def run(asked: DemoOptions) -> int:
             _say(f"! {note}")
         summary = summary_of({**summary, "logs": str(logs.resolve())}, live, truth)
         findings, closed = find(summary, troubles(source, inputs)), closed_by(summary, source, inputs, truth)
-        write_whole(asked.out / "demo.json", json.dumps({**summary, "findings": as_json(findings)}, indent=1))
+        files.append(_write_json(asked.out / "demo.json", {**summary, "findings": as_json(findings)}))
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
-    write_report(asked.out / "report.html", [asked.out / "demo.json"])
-    _say(f"wrote {asked.out / 'report.html'}")
+    write_report(page, files, compared_last=True)
+    _say(f"wrote {page}")
     with aside():
         click.echo("\n".join(live_table.lines(live, sent, summarise(truth.errors(live.closures)))))
         print_reasons(live.refusals)
         click.echo()
     live_table.require_balance(live, sent)
     notify(findings)
-    click.echo("\n".join(closing_lines(summary, findings, asked.out, own, closed)))
+    click.echo(f"Live: {verdict(summary, findings, closed)}")
+    click.echo("\n".join(closing_lines(first.summary, first.findings, asked.out, own, first.closed)))
     return exit_code(summary)
 
 
@@ -131,14 +142,20 @@ def closed_by(summary: Mapping[str, Any], source: Recording, inputs: Inputs, tru
     return RunSummary.of("demo", {**summary, "glimpses": glimpses}, truth).closed_revisits
 
 
+def _write_json(file: Path, summary: Mapping[str, Any]) -> Path:
+    write_whole(file, json.dumps(summary, indent=1))
+    return file
+
+
 def begun_summary(asked: DemoOptions, recording: Path, source: Recording, inputs: Inputs) -> dict[str, Any]:
     """The fields of the JSON on the recording, of which ``source`` was played, and on how the run was made."""
     changed = read_settings(asked.params_file, asked.changes).changed()
     return {
         "about": about(recording, model_of(asked), changed, sys.argv[1:]),
         "recording": str(source.path.resolve()),
-        "name": recording.resolve().name,
+        "name": f"{recording.resolve().name}, live",
         "inputs": inputs.outright,
+        **({"odometry": inputs.odom} if inputs.odom else {}),
         "camera": absolute(camera_asked(asked)),
         "T_base_camera": mounting_of(asked) or _mounting_by_tf(source, inputs),
         **setting(source, inputs, model_of(asked)),

@@ -167,7 +167,7 @@ def test_the_report_learns_how_the_run_was_made(place: str, tmp_path: Path, monk
     asked = replace(ASKED, model="objreg_ssd.onnx", changes=("detector.threshold=0.4",))
     with open_recording(tmp_path / place) as source:
         told = begun_summary(asked, tmp_path / "my room", source, INPUTS)
-    assert told["recording"] == str(tmp_path / place) and told["name"] == "my room"
+    assert told["recording"] == str(tmp_path / place) and told["name"] == "my room, live"
     assert told["about"]["command"] == "objreg demo 'my room'" and told["about"]["recording"].endswith("/my room")
     assert told["about"]["params"] == {"detector.threshold": 0.4} and told["about"]["model"]["name"] == told["model"]
     json.dumps(told)
