@@ -8,11 +8,15 @@ import re
 import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from report.chromium import chromium
 
 NO_NETWORK = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
+TELEPHONE = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": True}
 LOADED = re.compile(r'<(?:script|img|link|iframe)\b[^>]*?\b(?:src|href)="(?:https?:)?//[^"]*"')
 
 
@@ -73,3 +77,25 @@ def test_a_link_that_leads_nowhere_ends_the_build(repository: Path, tmp_path: Pa
     told = build(config, tmp_path / "out")
     assert told.returncode != 0 and "#nowhere" in told.stderr and "gone.md" in told.stderr
     assert "#a-page" not in told.stderr
+
+
+def test_the_search_finds_pages_that_are_read_without_a_server_and_no_table_is_wider_than_a_telephone(
+    site: Path,
+) -> None:
+    with chromium("--hide-scrollbars", "--window-size=1280,900") as browser:
+        browser.get((site / "index.html").as_uri())
+        browser.find_element("css selector", "[data-md-component=search-query]").send_keys("covariance")
+        wait_for(lambda: browser.execute_script("return document.querySelectorAll('.md-search-result__item').length"))
+        assert not browser.get_log("browser")
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", TELEPHONE)
+        for name in ("index", "wire", "parameters", "figures"):
+            browser.get((site / f"{name}.html").as_uri())
+            wait_for(lambda: browser.execute_script("return document.readyState === 'complete'"))
+            assert browser.execute_script("return document.documentElement.scrollWidth") <= TELEPHONE["width"], name
+
+
+def wait_for(done: Callable[[], object], seconds: float = 30.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
