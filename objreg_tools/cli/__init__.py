@@ -31,6 +31,7 @@ SUMMARIES = {
     "offline": "Run a recording through the three stages, without ROS.",
     "batch": "Run many recordings, over the cores of this machine or a cluster.",
     "replay": "Publish a recording into the live graph.",
+    "watch": "Show a running graph on a page of this machine.",
     "convert": "Write any recording as rosbag2.",
     "export": "Write the objects of a store as PLY and JSON.",
     "simulate": "Make a recording with exact ground truth.",

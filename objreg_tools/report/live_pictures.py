@@ -24,13 +24,22 @@ RIGHT, WRONG, TRAJECTORY = "#1a8a3c", "#d03b3b", "#8b8a83"
 def draw_sight(
     file: Path, rgb: Array, camera: Intrinsics, detections: Detections, objects: Sequence[ObjectCloud]
 ) -> None:
-    """Write the picture of one frame: boxes with names, and the points of each object in its colour."""
+    """Write the picture of one frame as `sight` draws it."""
+    write_picture(file, sight(rgb, camera, detections, objects))
+
+
+def sight(rgb: Array, camera: Intrinsics | None, detections: Detections, objects: Sequence[ObjectCloud]) -> Array:
+    """(H, W, 3) uint8 RGB of one frame: boxes with names, and the points of each object in its colour.
+
+    Without a camera there are no points.
+    """
     picture = np.ascontiguousarray(rgb[..., ::-1])
-    for item in objects:
-        _draw_points(picture, item.xyz, camera, _colour(item.instance))
+    if camera is not None:
+        for item in objects:
+            _draw_points(picture, item.xyz, camera, _colour(item.instance))
     for box, score, label in zip(detections.xyxy, detections.score, detections.label, strict=True):
         _draw_box(picture, box, f"{label} {score:.2f}")
-    write_picture(file, picture[..., ::-1])
+    return picture[..., ::-1]
 
 
 def write_picture(file: Path, rgb: Array) -> None:

@@ -1,0 +1,3 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of `objreg watch`: `watched.py` keeps what a graph published last, `topics.py` fills it, `server.py` shows
+it. What a place looks as from above is thinned by `thinned.py`."""
