@@ -22,6 +22,14 @@ SHOWN_AS = {  # the display of RViz → the type of message that it takes
     "PoseWithCovariance": "geometry_msgs/PoseWithCovarianceStamped",
 }
 OF_MOMENTS = "constraints"  # its frames are no frames of TF: nothing can place it
+LOOKS = {"visible", "pointSize", "colorMode", "colorField", "colorMap"}
+IN_SPACE = {"followMode", "followTf", "scene", "cameraState", "transforms", "topics", "layers", "publish", "imageMode"}
+SETTINGS = {  # the panel of Foxglove → what it reads of its settings
+    "3D": IN_SPACE,
+    "Image": IN_SPACE,
+    "DiagnosticSummary": {"topicToRender", "minLevel", "pinnedIds", "hardwareIdFilter", "sortByLevel"},
+    "RawMessages": {"topicPath", "diffEnabled", "diffMethod", "diffTopicPath", "showFullMessageForDiff"},
+}
 LATCHED = {"markers", "path", "relocalised"}
 
 
@@ -72,6 +80,12 @@ def test_every_panel_of_foxglove_has_its_place_and_its_settings(foxglove: dict[s
     assert sorted(placed) == sorted(foxglove["configById"])
     assert {name.partition("!")[0] for name in placed} == {"3D", "Image", "DiagnosticSummary", "RawMessages"}
     assert {"globalVariables", "userNodes", "playbackConfig"} <= set(foxglove)
+
+
+def test_foxglove_reads_every_setting_that_a_panel_has(foxglove: dict[str, Any]) -> None:
+    for name, settings in foxglove["configById"].items():
+        assert set(settings) <= SETTINGS[name.partition("!")[0]], name
+        assert all(set(looks) <= LOOKS for looks in settings.get("topics", {}).values()), name
 
 
 def test_foxglove_shows_topics_of_the_graph(foxglove: dict[str, Any], topics: dict[str, str]) -> None:

@@ -36,7 +36,7 @@ def sight(rgb: Array, camera: Intrinsics | None, detections: Detections, objects
     picture = np.ascontiguousarray(rgb[..., ::-1])
     if camera is not None:
         for item in objects:
-            _draw_points(picture, item.xyz, camera, _colour(item.instance))
+            _draw_points(picture, item.xyz, camera, colour_of(item.instance))
     for box, score, label in zip(detections.xyxy, detections.score, detections.label, strict=True):
         _draw_box(picture, box, f"{label} {score:.2f}")
     return picture[..., ::-1]
@@ -53,7 +53,8 @@ def write_picture(file: Path, rgb: Array) -> None:
     write_whole(file, encoded.tobytes())
 
 
-def _colour(instance: int) -> tuple[int, int, int]:
+def colour_of(instance: int) -> tuple[int, int, int]:
+    """The colour of an object, BGR."""
     hsv = np.array([[[int(instance * GOLDEN_ANGLE % 360 / 2), 200, 255]]], np.uint8)
     b, g, r = (int(value) for value in cv2.cvtColor(hsv, cv2.COLOR_HSV2BGR)[0, 0])
     return b, g, r
