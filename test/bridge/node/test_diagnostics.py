@@ -71,4 +71,6 @@ def test_the_numbers_of_a_refusal_and_the_objects_of_a_constraint_come_back_as_t
     )  # fmt: skip
     (sent,) = acceptances("/registrar", Time(sec=4), [closure]).status
     assert (sent.name, sent.message) == ("/registrar: constraint", "cup")
-    assert accepted_of(sent) == ((5, 2**61), {"labels": ("cup", "cup"), "objects": (cup,), "evidence": numbers})
+    stamps_ns, known = accepted_of(sent)
+    assert stamps_ns == (5, 2**61) and known["labels"] == ("cup", "cup") and known["evidence"] == numbers
+    assert [(match.label, match.object_id) for match in known["objects"]] == [("cup", 4)]
