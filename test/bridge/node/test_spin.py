@@ -25,7 +25,7 @@ from objreg_ros.bridge.node.spin import run
 def on_its_own(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A graph that ends at this machine; the transport and the frozen garbage of a node are not for other tests."""
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    monkeypatch.setattr("objreg_ros.bridge.process.profile.apply", lambda: "the transport")
+    monkeypatch.setattr("objreg_ros.bridge.process.profile.apply", lambda **_: "the transport")
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
     for number, handler in handlers.items():
