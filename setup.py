@@ -8,6 +8,7 @@ from glob import glob
 from pathlib import Path
 
 from setuptools import Extension, find_packages, setup
+from setuptools.command.build_py import build_py
 
 NAME = "objreg_ros"
 PACKAGES = ("objreg_ros", "objreg_mapper", "objreg_tools")
@@ -21,6 +22,18 @@ def files_below(folder: str) -> list[tuple[str, list[str]]]:
         for root, _, names in os.walk(folder)
         if names
     ]
+
+
+class BuildPython(build_py):
+    """Leaves no header of an earlier build among what is installed: a kernel's build is marked with all of them."""
+
+    def run(self) -> None:
+        """Remove what an older source left, then copy as usual."""
+        root = Path(__file__).resolve().parent
+        for path in Path(self.build_lib).rglob("native/*.?pp"):
+            if not (root / path.relative_to(self.build_lib)).exists():
+                path.unlink()
+        super().run()
 
 
 def kernels() -> list[Extension]:
@@ -82,6 +95,7 @@ setup(
     maintainer_email="maintainers@objreg-ros.invalid",
     packages=find_packages(include=[*PACKAGES, *(f"{package}.*" for package in PACKAGES)]),
     package_data={package: ["py.typed", "report/templates/*", "**/native/*.?pp"] for package in PACKAGES},
+    cmdclass={"build_py": BuildPython},
     ext_modules=kernels(),
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),

@@ -16,10 +16,16 @@ import pytest
 
 MOST_S = 1800.0  # of a build: a Raspberry Pi takes ten minutes for the messages
 NEEDED = ("ament_cmake", "rosidl_default_generators")  # what builds messages, in a prefix that the environment names
-IMPORTS = (
-    "import objreg_msgs, objreg_ros; from objreg_msgs.msg import LoopClosure; from objreg_msgs.srv import Relocalise; "
+MESSAGES = (
+    "import objreg_msgs; from objreg_msgs.msg import LoopClosure; from objreg_msgs.srv import Relocalise; "
     "print(objreg_msgs.__file__)"
 )
+KERNELS = (
+    'import sys; from objreg_ros.native import chosen_build, kernels; kernels("rvl"); '
+    'print(sys.modules[f"objreg_ros.native.{chosen_build()}"].__file__)'
+)
+LEFT_OUT = (".*", "*.so", "*.egg-info", "__pycache__", "build", "install", "log", "out", "site")
+BOTH = pytest.mark.parametrize("how", [(), ("--symlink-install",)], ids=["copied", "linked"])
 
 
 def is_there(package: str) -> bool:
@@ -33,8 +39,7 @@ def workspace(tmp_path: Path, repository: Path) -> Path:
     """A workspace with this repository in it, and nothing built."""
     if shutil.which("colcon") is None:
         pytest.skip("colcon is not installed")
-    (tmp_path / "src").mkdir()
-    (tmp_path / "src/objreg_ros").symlink_to(repository)
+    shutil.copytree(repository, tmp_path / "src/objreg_ros", ignore=shutil.ignore_patterns(*LEFT_OUT))
     return tmp_path
 
 
@@ -48,27 +53,49 @@ def workspace_with_messages(workspace: Path) -> Path:
 
 
 def told(workspace: Path, *words: str) -> str:
-    done = subprocess.run(words, cwd=workspace, capture_output=True, text=True, timeout=MOST_S)
+    outside = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "OBJREG_CHECKED"}}
+    done = subprocess.run(words, cwd=workspace, env=outside, capture_output=True, text=True, timeout=MOST_S)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
+def printed_after_setup(workspace: Path, program: str) -> Path:
+    """The path that a program prints where the install space is sourced."""
+    return Path(told(workspace, "bash", "-c", f". install/setup.bash && {sys.executable} -c '{program}'").split()[-1])
+
+
+def assert_kernels_are_of(workspace: Path, linked: bool) -> None:
+    """A link leads to build/, and from there to the sources: nothing of the checkout under test."""
+    found = printed_after_setup(workspace, KERNELS)
+    assert found.is_relative_to(workspace / ("build" if linked else "install")), found
+    assert found.resolve().is_relative_to(workspace), found
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [(), ("--symlink-install",)], ids=["copied", "linked"])
+@BOTH
 def test_a_clean_workspace_builds_both_packages(workspace_with_messages: Path, how: tuple[str, ...]) -> None:
     workspace = workspace_with_messages
     paths = ("--base-paths", "src/objreg_ros", "src/objreg_ros/objreg_msgs")
     assert told(workspace, "colcon", "list", "--names-only", *paths).split() == ["objreg_msgs", "objreg_ros"]
     told(workspace, "colcon", "build", *how, *paths)
-    found = told(workspace, "bash", "-c", f". install/setup.bash && {sys.executable} -c '{IMPORTS}'").split()[-1]
-    assert Path(found).is_relative_to(workspace / "install")
+    assert printed_after_setup(workspace, MESSAGES).is_relative_to(workspace / "install")
+    assert_kernels_are_of(workspace, linked=bool(how))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [(), ("--symlink-install",)], ids=["copied", "linked"])
+@BOTH
 def test_a_clean_workspace_builds_the_nodes_without_the_messages(workspace: Path, how: tuple[str, ...]) -> None:
     told(workspace, "colcon", "build", *how, "--base-paths", "src", "--packages-select", "objreg_ros")
     assert (workspace / "install/objreg_ros/share/objreg_ros/package.xml").exists()
+    assert_kernels_are_of(workspace, linked=bool(how))
+
+
+def test_a_header_that_is_gone_is_gone_from_the_next_build(tmp_path: Path, repository: Path) -> None:
+    old, kept = (tmp_path / f"objreg_ros/native/{name}" for name in ("gone.hpp", "array.hpp"))
+    old.parent.mkdir(parents=True)
+    old.touch()
+    told(repository, sys.executable, "setup.py", "--quiet", "build_py", "--build-lib", str(tmp_path))
+    assert kept.exists() and not old.exists()
 
 
 def test_setup_runs_beside_a_link_to_it_as_colcon_makes_one(tmp_path: Path, repository: Path) -> None:
