@@ -157,7 +157,7 @@ inline Array<float, 2> turned(View<const float, 2> depth, Camera camera, View<co
     for (i32 column = 0; column < columns; column++) {  // without branches, for the vectors
       const float x = slope[column];
       const float away = 1.0f - a * y + b * x;  // the rotation back, of a ray of the colour camera
-      const float near = 1.0f / away;
+      const float near = 1.0f / (away > LEAST_AWAY ? away : 1.0f);
       const float u = fx * (x - b + c * y) * near + cx, v = fy * (y - c * x + a) * near + cy;
       const bool seen = (away > LEAST_AWAY) & (u > -0.5f) & (v > -0.5f) & (u < right) & (v < bottom);
       nearness[column] = seen ? near : 0.0f;
