@@ -82,11 +82,18 @@ class _ClosesNothing:
 
 
 def rehearse(
-    source: Recording, inputs: Inputs, frames: int = FRAMES, on_frame: Callable[[int], None] = lambda frames: None
+    source: Recording,
+    inputs: Inputs,
+    frames: int = FRAMES,
+    on_frame: Callable[[int], None] = lambda frames: None,
+    params: LineParams | None = None,
 ) -> Run:
-    """The run of the first ``frames`` of a recording. ``on_frame`` as in `run_offline`."""
+    """The run of the first ``frames`` of a recording. ``on_frame`` as in `run_offline`.
+
+    ``params`` are those of the defaults where None.
+    """
     stages = Stages(SeesNothing(), _CutsNothing(), _ClosesNothing())
-    params = LineParams(frames=frame_tree(source, camera_frame(source, inputs)))
+    params = params or LineParams(frames=frame_tree(source, camera_frame(source, inputs)))
     return run_offline(_beginning(source, inputs, frames), stages, inputs, params, on_frame=on_frame)
 
 

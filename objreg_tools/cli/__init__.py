@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `objreg`: one file a subcommand, imported only when it is called.
 
-``cli/commands/<name>.py`` holds the command ``<name>`` (dashes become underscores) as the function ``command``.
+``cli/commands/<name>.py`` holds the command ``<name>`` (dashes become underscores, and ``try`` is
+``try_.py``) as the function ``command``.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,7 @@ from objreg_tools.cli import verbosity
 
 # The text of `objreg --help`, without importing a command. A name without its file is not shown.
 SUMMARIES = {
+    "try": "From a recording to a page in one command.",
     "demo": "Run a recording through the live graph and show what came out.",
     "inspect": "Show what is in a recording and what the graph would use of it, or what a store holds.",
     "offline": "Run a recording through the three stages, without ROS.",
@@ -91,7 +94,8 @@ class LazyGroup(click.Group):
 
 
 def _module(name: str) -> str:
-    return name.replace("-", "_")
+    """The file of a command; ``try`` is a word of Python's own."""
+    return name.replace("-", "_") + ("_" if iskeyword(name) else "")
 
 
 def _print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:

@@ -25,7 +25,7 @@ from objreg_tools.recording.mounts import camera_frame, first_frames, frame_tree
 from objreg_tools.recording.recorded_detections import RecordedDetections, choose_detections, recorded_detections
 from objreg_tools.recording.tf_odometry import by_transforms, with_transforms
 from objreg_tools.recording.troubles import FOLDER, unpaired
-from objreg_tools.rehearsal import SeesNothing
+from objreg_tools.rehearsal import FRAMES, SeesNothing, rehearse
 from objreg_tools.report.run.about import about
 from objreg_tools.report.run.camera_map import TRACKED
 from objreg_tools.report.run.findings import setting
@@ -194,6 +194,16 @@ class Opened:
         finally:
             close()
 
+    @property
+    def setting(self) -> dict[str, Any]:
+        """See `findings.setting`."""
+        return setting(self.source, self.inputs, self.asked.settings.of("detector", DetectorParams).model)
+
+    def rehearse(self, on_frame: Callable[[int], None]) -> Run:
+        """The run of the first frames without detector and registrar, see `rehearse`; without odometry that drifts."""
+        inputs = replace(self.inputs, odom=None) if self.asked.drifts else self.inputs
+        return rehearse(self.source, inputs, min(FRAMES, self.frames), on_frame, self._params())
+
     def summary(self, run: Run, arguments: Sequence[str]) -> dict[str, Any]:
         """The run as JSON, with its settings; ``arguments`` are those of `objreg`."""
         settings, model = self.asked.settings, self.asked.settings.of("detector", DetectorParams).model
@@ -206,7 +216,7 @@ class Opened:
             "detections_from": self.recorded.topic if self.recorded else None,
             "rectified": segmenter.rectified,
             "camera": absolute(segmenter.camera),
-            **setting(self.source, self.inputs, model),
+            **self.setting,
             **run.summary(self.truth),
         }
 

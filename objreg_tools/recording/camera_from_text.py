@@ -26,7 +26,7 @@ class CameraFromText(Recording):
 
     def __init__(self, of: Recording, camera: Calibration, frame_id: str, notes: Sequence[str] = ()) -> None:
         self._of, self._camera, self._frame_id = of, camera, frame_id
-        self.path, self.kind, self.of_pictures = of.path, of.kind, of.of_pictures
+        self.path, self.kind, self.of_pictures, self.made_of = of.path, of.kind, of.of_pictures, of.made_of
         others = sorted(of.topics.keys() - _without_cameras(of).keys())
         self.notes = [*of.notes, *notes, *([f"not used, as a camera is given: {', '.join(others)}"] if others else [])]
         self.start_ns, self.end_ns = of.start_ns, of.end_ns

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
 
 from rosbags.interfaces import Qos, QosDurability
@@ -79,9 +80,11 @@ class Recording(ABC):
     """A recording that is open; a context manager. ``notes`` say what was assumed or is odd, for the user.
 
     ``of_pictures`` is whether it is a folder of pictures: its topics are made here, and no remap finds others.
+    ``made_of`` says of such topics which files they are made of, and what was assumed of these.
     """
 
     of_pictures: bool = False
+    made_of: Mapping[str, str] = MappingProxyType({})
     path: Path
     kind: str
     topics: dict[str, Topic]

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -31,16 +31,18 @@ from objreg_tools.truth import Truth
 ODOMETRY_SLOP_NS = 20_000_000  # as the registrar's default
 
 
-def write_report(out: Path, runs: Sequence[Path], compared_last: bool = False) -> list[str]:
+def write_report(
+    out: Path, runs: Sequence[Path], compared_last: bool = False, on_picture: Callable[[], None] = lambda: None
+) -> list[str]:
     """Write one page about runs from the files of `objreg offline --json`, or of `objreg demo`.
 
     Several runs are compared before them; with ``compared_last`` after them.
 
     The recording that a run names gives truth and pictures. Where it is gone, the page does without; the result has one
-    line for each such run. ValueError for a file that is no run.
+    line for each such run. ``on_picture`` is called whenever a picture was read. ValueError for a file that is no run.
     """
     with ExitStack() as stack:
-        loaded = [_loaded(file, stack) for file in runs]
+        loaded = [_loaded(file, stack, on_picture) for file in runs]
         text = page(loaded, compared_last)
     write_whole(out, text)
     lacking = [file for file, (_, album) in zip(runs, loaded, strict=True) if album is None]
@@ -49,7 +51,7 @@ def write_report(out: Path, runs: Sequence[Path], compared_last: bool = False) -
     ]
 
 
-def _loaded(file: Path, stack: ExitStack) -> tuple[RunSummary, Album | None]:
+def _loaded(file: Path, stack: ExitStack, on_picture: Callable[[], None]) -> tuple[RunSummary, Album | None]:
     summary = _read(file)
     place = Path(summary.get("recording", ""))
     if not summary.get("recording") or not place.exists():
@@ -61,7 +63,7 @@ def _loaded(file: Path, stack: ExitStack) -> tuple[RunSummary, Album | None]:
     glimpses = with_odometry(summary.get("glimpses", ()), recording, inputs.odom, T_base_camera)
     complete = {**_of_nodes(summary), **summary, "glimpses": glimpses}
     run = RunSummary.of(summary.get("name", place.resolve().name), complete, Truth.of(recording, inputs.ground_truth))
-    return run, Album(recording, inputs, summary.get("rectified", "auto"))
+    return run, Album(recording, inputs, summary.get("rectified", "auto"), on_picture)
 
 
 def _inputs_of(summary: Mapping[str, Any], recording: Recording) -> dict[str, str]:

@@ -8,12 +8,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import click
-from tqdm import tqdm
 
 from objreg_ros.memory.store_file import is_store
-from objreg_ros.plausibility.finding import Finding
 from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import NOTHING, options
+from objreg_tools.cli.first_look import look
 from objreg_tools.cli.paths import OutputPath
 from objreg_tools.cli.run_output import notify, print_next
 from objreg_tools.recording import Recording, open_recording
@@ -24,9 +23,8 @@ from objreg_tools.recording.recorded_detections import recorded_detections
 from objreg_tools.recording.summary import describe_lens, describe_topics
 from objreg_tools.recording.tf_odometry import by_transforms, with_transforms
 from objreg_tools.recording.troubles import warnings
-from objreg_tools.rehearsal import FRAMES, rehearse
+from objreg_tools.rehearsal import rehearse
 from objreg_tools.report.live_pictures import write_picture
-from objreg_tools.report.run.findings import found_in
 from objreg_tools.report.store.portraits import portraits
 from objreg_tools.report.store.store_drawing import draw
 from objreg_tools.report.store.store_page import store_page
@@ -69,27 +67,13 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
         _say_truth(source, inputs)
         for note in by_transforms(source, inputs):
             click.echo(note)
-        runs, found = _rehearsed(source, inputs) if inputs.complete else (False, ())
-        notify([*warnings(source, inputs), *found])
-    if not runs:
+        seen = look(lambda show: rehearse(source, inputs, on_frame=show)) if inputs.complete else None
+        notify([*warnings(source, inputs), *(seen.findings if seen else ())])
+    if seen is None or not seen.runs:
         return NOTHING
     options = [f"--remap={remap}" for remap in remaps] + ([f"--camera={camera}"] if camera else [])
     print_next("objreg", "offline", str(recording), *options, "--json", "run.json")
     return 0
-
-
-def _rehearsed(source: Recording, inputs: Inputs) -> tuple[bool, tuple[Finding, ...]]:
-    """Whether the graph would run on the first frames, and what is found in them; a bar shows how far it is."""
-    with tqdm(total=FRAMES, unit="frame", desc="looking at frames", disable=None, leave=False) as bar:
-
-        def show(frames: int) -> None:
-            bar.update(frames - bar.n)
-
-        try:
-            run = rehearse(source, inputs, on_frame=show)
-        except ValueError as error:  # a file that is broken in its middle: a run has what comes before
-            return bar.n > 0, (Finding(str(error)),)
-    return run.frames > 0, found_in(run)
 
 
 def _say_store(store: Path, picture: Path | None, page: Path | None) -> None:

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,8 +48,14 @@ class FolderRecording(Recording):
 
     of_pictures = True
 
-    def __init__(self, path: Path, moments: Iterable[FrameFiles], notes: Iterable[str]) -> None:
-        self.path, self.notes = path, list(notes)
+    def __init__(
+        self,
+        path: Path,
+        moments: Iterable[FrameFiles],
+        notes: Iterable[str],
+        made_of: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        self.path, self.notes, self.made_of = path, list(notes), made_of
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
         counts = {name: sum(m.topic == name for m in self._sequence) for name in TYPES}
@@ -80,6 +87,17 @@ def moments_of_pairs(folder: Path, pairs: Sequence[Pair], camera: TumCamera) -> 
             ),
         )
     ]
+
+
+def made_of_pairs(pairs: Sequence[Pair], camera: TumCamera, camera_file: str) -> dict[str, str]:
+    """`Recording.made_of` for what `moments_of_pairs` makes: the folders, the steps of depth, and the camera's file."""
+    _, colour, _, depth = pairs[0]
+    steps = f"{camera.depth_scale:g} steps in a metre"
+    return {IMAGE: _folder_of(colour), DEPTH: f"{_folder_of(depth)}, {steps}", CAMERA_INFO: camera_file}
+
+
+def _folder_of(picture: str) -> str:
+    return f"{Path(picture).parent.as_posix()}/"
 
 
 def info_moment(camera: TumCamera, stamp_ns: int) -> FrameFiles:

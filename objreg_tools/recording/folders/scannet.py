@@ -22,6 +22,7 @@ from objreg_tools.recording.folders.folder import (
     FolderRecording,
     FrameFiles,
     Pair,
+    made_of_pairs,
     moments_of_pairs,
     true_moment,
 )
@@ -54,7 +55,8 @@ class ScanNetRecording(FolderRecording):
         camera, of_camera = _camera(path / CAMERA, colour, depth)
         truth, of_truth = _truth(path / POSES, {Path(name).stem for _, name, _, _ in pairs})
         moments = moments_of_pairs(path, pairs, camera) + truth
-        super().__init__(path, moments, [NUMBERED, *notes, *of_camera, *larger_colour(colour, depth), *of_truth])
+        remarks = [NUMBERED, *notes, *of_camera, *larger_colour(colour, depth), *of_truth]
+        super().__init__(path, moments, remarks, made_of_pairs(pairs, camera, f"{CAMERA}/"))
 
 
 def is_scannet(folder: Path) -> bool:

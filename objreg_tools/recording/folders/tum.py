@@ -25,6 +25,7 @@ from objreg_tools.recording.folders.folder import (
     FolderRecording,
     FrameFiles,
     Pair,
+    made_of_pairs,
     moments_of_pairs,
     pose_of_numbers,
     true_moment,
@@ -73,7 +74,9 @@ class TumRecording(FolderRecording):
         moments = moments_of_pairs(path, pairs, camera) + truth
         first_ns, last_ns = min(m.stamp_ns for m in moments), max(m.stamp_ns for m in moments)
         moments += _accelerations(path / "accelerometer.txt", first_ns - AROUND_NS, last_ns + AROUND_NS)
-        super().__init__(path, moments, [*notes, *of_camera, *of_truth])
+        file = camera_file(path)
+        made_of = made_of_pairs(pairs, camera, file.name if file.exists() else f"no {file.name}: the default camera")
+        super().__init__(path, moments, [*notes, *of_camera, *of_truth], made_of)
 
 
 def camera_of_pairs(folder: Path, pairs: Sequence[Pair]) -> tuple[TumCamera, list[str]]:

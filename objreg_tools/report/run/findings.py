@@ -230,6 +230,18 @@ def _simulated_model(counts: Counts, summary: Mapping[str, Any]) -> Finding | No
     )
 
 
+def simulated_model_on_real(setting: Mapping[str, Any]) -> Finding | None:
+    """A recording that was not simulated, with the model that knows simulated rooms; ``setting`` as `setting` gives."""
+    if setting.get("model") != share.EMBEDDED or setting.get("simulated") is not False:
+        return None
+    return Finding(
+        f"the detector's model, {share.EMBEDDED}, was trained on simulated rooms, and this recording is real",
+        "of real rooms it knows little, so few loops close, or none",
+        FETCH,
+        "model-of-simulated-rooms",
+    )
+
+
 def _overtaken(summary: Mapping[str, Any]) -> Finding | None:
     late = {
         node: f"{counters['dropped'][OVERTAKEN]} of {counters['received']}"

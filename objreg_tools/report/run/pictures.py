@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import cv2
@@ -32,9 +32,17 @@ class Album:
     """The colour and depth of a recording at any time, by the stamps of the messages.
 
     Pictures with lens distortion are rectified, unless ``rectified``, the segmenter's parameter, says they are already.
+    ``on_picture`` is called whenever one was read.
     """
 
-    def __init__(self, recording: Recording, inputs: Inputs, rectified: str = "auto") -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        inputs: Inputs,
+        rectified: str = "auto",
+        on_picture: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._on_picture = on_picture
         source = inputs.depth or inputs.points
         self._is_cloud = inputs.depth is None
         image = None if self._is_cloud else inputs.image  # a cloud has its colour in it
@@ -68,6 +76,7 @@ class Album:
     def _seen(self, stamp_ns: int) -> DepthImage | str:
         if stamp_ns not in self._known:
             self._known[stamp_ns] = self._read(stamp_ns)
+            self._on_picture()
             if len(self._known) > KEPT:
                 del self._known[next(iter(self._known))]
         return self._known[stamp_ns]

@@ -97,6 +97,7 @@ FIELDS: dict[str, tuple[str, Check]] = {
     "frames": ("a count", _is_count),
     "detections": ("a count", _is_count),
     "objects": ("a count", _is_count),
+    "assumed": ("an object of texts", _each(_is_text)),
     "findings": ("a list of objects of what, cause, todo and anchor", _is_findings),
     "rejected": ("an object of counts by reason", _each(_is_count)),
     "stage_ms": ("an object of p50 and p95 in ms by stage", _each(_is_stage)),

@@ -41,6 +41,7 @@ def view_of_run(run: RunSummary, album: Album | None, runs: int = 1, spatial: bo
         "name": run.name,
         "said": _said(run),
         "findings": run.summary.get("findings", ()),
+        "assumed": run.summary.get("assumed", {}),
         "tiles": _tiles(run, tracks),
         "about": about_rows(run.summary.get("about", {})),
         "trajectory": _trajectory_view(run, tracks),
