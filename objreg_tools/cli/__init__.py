@@ -32,6 +32,7 @@ SUMMARIES = {
     "demo": "Run a recording through the live graph and show what came out.",
     "inspect": "Show what is in a recording and what the graph would use of it, or what a store holds.",
     "offline": "Run a recording through the three stages, without ROS.",
+    "pair": "Register two frames of a recording, and show what each step saw.",
     "batch": "Run many recordings, over the cores of this machine or a cluster.",
     "replay": "Publish a recording into the live graph.",
     "watch": "Show a running graph on a page of this machine.",

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_tools.cli.settings import Settings, read_settings
 from objreg_tools.offline.line import LineParams, run_offline
 from objreg_tools.offline.run import Run
-from objreg_tools.offline.stages import Detects, build_stages
+from objreg_tools.offline.stages import Detects, Stages, build_stages
 from objreg_tools.recording import Record, Recording, open_recording
 from objreg_tools.recording.camera_from_text import with_camera
 from objreg_tools.recording.drift import ODOM, with_drifting_odometry
@@ -199,10 +199,23 @@ class Opened:
         """See `findings.setting`."""
         return setting(self.source, self.inputs, self.asked.settings.of("detector", DetectorParams).model)
 
-    def rehearse(self, on_frame: Callable[[int], None]) -> Run:
+    @property
+    def topics(self) -> set[str]:
+        """The topics that a run reads."""
+        return {
+            *self.inputs.chosen().values(),
+            *moving_topics(self.source),
+            *(self.recorded.topics if self.recorded else ()),
+        }
+
+    def run_through(self, records: Iterable[Record], stages: Stages, on_frame: Callable[[int], None]) -> Run:
+        """The result of other stages on some of the records. ``on_frame`` as in `run_offline`."""
+        return run_offline(records, stages, self.inputs, self._params(), None, on_frame, self.recorded)
+
+    def rehearse(self, on_frame: Callable[[int], None], frames: int = FRAMES) -> Run:
         """The run of the first frames without detector and registrar, see `rehearse`; without odometry that drifts."""
         inputs = replace(self.inputs, odom=None) if self.asked.drifts else self.inputs
-        return rehearse(self.source, inputs, min(FRAMES, self.frames), on_frame, self._params())
+        return rehearse(self.source, inputs, min(frames, self.frames), on_frame, self._params())
 
     def summary(self, run: Run, arguments: Sequence[str]) -> dict[str, Any]:
         """The run as JSON, with its settings; ``arguments`` are those of `objreg`."""
@@ -230,11 +243,9 @@ class Opened:
         return LineParams(segmenter, registrar, frames, settings.of("detector", DetectorParams).max_rate)
 
     def _records(self) -> Iterator[Record]:
-        recorded = self.recorded.topics if self.recorded else {}
-        topics = {*self.inputs.chosen().values(), *moving_topics(self.source), *recorded}
         seconds = self.asked.seconds
         end_ns = None if seconds is None else self.source.start_ns + round(seconds * 1e9)
-        records = self.source.records(topics, end_ns=end_ns)
+        records = self.source.records(self.topics, end_ns=end_ns)
         if not self.asked.drifts or self.inputs.ground_truth is None:
             return records
         seed = int(str(self.asked.odometry).removeprefix(DRIFT))

@@ -140,7 +140,7 @@ def _say_outcome(run: Run, findings: Sequence[Finding], said: Iterable[Finding])
     notify(finding for finding in findings if not finding.anchor or finding.anchor not in before)
     for finding in said:
         if finding.anchor and finding.anchor not in after:
-            _say(f"of the first frames alone: {finding.what}")
+            _say(f"seen before the run, and not found in it: {finding.what}")
     print_reasons(run.refusals)
 
 
@@ -151,7 +151,7 @@ def _say(text: str) -> None:
 
 def _write_page(files: Files) -> None:
     with tqdm(unit="picture", desc="drawing", disable=None, leave=False) as bar:
-        write_report(files.page, [files.json], bar.update)
+        write_report(files.page, [files.json], on_picture=bar.update)
 
 
 def _say_page(files: Files, opens: bool) -> None:

@@ -236,7 +236,7 @@ def simulated_model_on_real(setting: Mapping[str, Any]) -> Finding | None:
         return None
     return Finding(
         f"the detector's model, {share.EMBEDDED}, was trained on simulated rooms, and this recording is real",
-        "of real rooms it knows little, so few loops close, or none",
+        "of real objects it knows little, and finds fewer places again than it could",
         FETCH,
         "model-of-simulated-rooms",
     )
