@@ -89,7 +89,7 @@ def _model(opened: Opened) -> str:
         why = "as asked for"
     else:
         is_embedded = name == share.EMBEDDED
-        why = "of simulated rooms, as no other is installed" if is_embedded else "of COCO, as it is installed"
+        why = "trained in simulation, as no other is installed" if is_embedded else "of COCO, as it is installed"
     return f"{name}, {why}; scores from {detector.threshold:g} on"
 
 

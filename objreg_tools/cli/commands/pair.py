@@ -76,6 +76,7 @@ def command(
         found = register_pair(one, two, params, opened.truth.between(one.stamp_ns, two.stamp_ns))
         summary = {"recording": str(recording.resolve()), "start_ns": start_ns, **found.summary}
         print_pair(summary)
+        click.echo(verdict_of(summary))
         write_json(summary)
         if page is not None:
             write_whole(
@@ -128,7 +129,6 @@ def print_pair(summary: Mapping[str, Any]) -> None:
     _say_hypotheses(summary["hypotheses"])
     _say_candidates(summary["candidates"])
     _say_odds(summary["odds"])
-    click.echo(verdict_of(summary))
 
 
 def verdict_of(summary: Mapping[str, Any]) -> str:

@@ -27,6 +27,7 @@ from objreg_tools.cli.verbosity import aside
 from objreg_tools.offline.run import Run
 from objreg_tools.recording.troubles import troubles
 from objreg_tools.rehearsal import FRAMES
+from objreg_tools.report.pair.pair_command import pair_command
 from objreg_tools.report.run.findings import as_json, find, simulated_model_on_real, verdict
 from objreg_tools.report.run.run_summary import RunSummary
 from objreg_tools.report.write import write_report
@@ -71,9 +72,9 @@ def _contains(file: Path, mark: str) -> bool:
     show_default="the current one",
     help="The folder of the page and the JSON, which have the name of the recording.",
 )
-@click.option("--open/--no-open", "opens", default=True, help="Show the page in a browser, where there is a display.")
+@click.option("--no-open", is_flag=True, help="Do not show the page in a browser, as is done where there is a display.")
 @options.of_run
-def command(recording: Path, out: Path, opens: bool, **given: Any) -> int:
+def command(recording: Path, out: Path, no_open: bool, **given: Any) -> int:
     """From RECORDING to a page in one command: inspect, offline, report.
 
     Findings on the recording come first, as a camera or a scale of depth that is not its own. Then what was assumed:
@@ -102,7 +103,9 @@ def command(recording: Path, out: Path, opens: bool, **given: Any) -> int:
     out.mkdir(parents=True, exist_ok=True)
     write_whole(files.json, json.dumps({**summary, **added}, indent=1))
     _write_page(files)
-    _say_page(files, opens)
+    _say_page(files, not no_open)
+    if run.closures:
+        _say_first_pair(summary)
     return exit_code(summary)
 
 
@@ -142,6 +145,14 @@ def _say_outcome(run: Run, findings: Sequence[Finding], said: Iterable[Finding])
         if finding.anchor and finding.anchor not in after:
             _say(f"seen before the run, and not found in it: {finding.what}")
     print_reasons(run.refusals)
+
+
+@aside()
+def _say_first_pair(summary: Mapping[str, Any]) -> None:
+    """The command that shows the steps of the first closure."""
+    start_ns, first = summary["glimpses"][0]["stamp_ns"], summary["constraints"][0]
+    seconds = ((first[name] - start_ns) * 1e-9 for name in ("from_ns", "to_ns"))
+    click.echo(f"next: {pair_command(summary, *seconds)}")
 
 
 @aside()

@@ -53,14 +53,21 @@ def pair_page(name: str, summary: Mapping[str, Any], found: RegisteredPair, seen
 
 
 def _picture(seen: Seen, keyframe: Keyframe) -> str:
-    """The picture with its boxes and the points of its objects."""
-    image, nothing = seen.image, np.zeros((0, 4), np.float32)
-    found = seen.detections or Detections(
-        xyxy=nothing, score=nothing[:, 0], label=(), image_hw=image.depth.shape, stamp_ns=image.stamp_ns
-    )
+    """The picture with its boxes and the points of its objects, drawn at the size at which it is shown."""
+    image, found = seen.image, seen.detections
     assert image.rgb is not None  # an album gives no picture without colour
-    clouds = [item.cloud for item in keyframe.objects]
-    return data_uri(sight(image.rgb, image.intrinsics, found, clouds))
+    step = max(1, image.intrinsics.width // WIDTH)
+    camera = image.intrinsics.scaled(step)
+    size = camera.width, camera.height
+    small = cv2.resize(np.ascontiguousarray(image.rgb), size, interpolation=cv2.INTER_AREA)
+    boxes = Detections(
+        xyxy=np.zeros((0, 4), np.float32) if found is None else found.xyxy / np.float32(step),
+        score=np.zeros(0, np.float32) if found is None else found.score,
+        label=() if found is None else found.label,
+        image_hw=small.shape[:2],
+        stamp_ns=image.stamp_ns,
+    )
+    return data_uri(sight(small, camera, boxes, [item.cloud for item in keyframe.objects]))
 
 
 def _matches(first: DepthImage, second: DepthImage, matches: KeypointMatches, T_1_2: Array | None) -> dict[str, Any]:

@@ -235,7 +235,7 @@ def simulated_model_on_real(setting: Mapping[str, Any]) -> Finding | None:
     if setting.get("model") != share.EMBEDDED or setting.get("simulated") is not False:
         return None
     return Finding(
-        f"the detector's model, {share.EMBEDDED}, was trained on simulated rooms, and this recording is real",
+        f"the detector's model, {share.EMBEDDED}, was trained in simulation, and this recording is real",
         "of real objects it knows little, and finds fewer places again than it could",
         FETCH,
         "model-of-simulated-rooms",

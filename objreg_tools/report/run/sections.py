@@ -11,6 +11,7 @@ from typing import Any
 from objreg_ros.data.closures import UNTRIED
 from objreg_tools.report.closures.matched_objects import Drawn, pair_drawing
 from objreg_tools.report.closures.weighed_evidence import EVIDENCE, weighed
+from objreg_tools.report.pair.pair_command import pair_command
 from objreg_tools.report.run import clouds, figures, thumbnails
 from objreg_tools.report.run.camera_map import of_one_clock
 from objreg_tools.report.run.clouds import Clouds
@@ -87,7 +88,8 @@ def _model_text(model: Mapping[str, Any]) -> str:
 
 def _said(run: RunSummary) -> str:
     said = _verdict(run)
-    return f"{said} Lens: {lens}." if (lens := run.summary.get("lens")) else said
+    lens = "" if run.summary.get("assumed") else run.summary.get("lens")  # which has it
+    return f"{said} Lens: {lens}." if lens else said
 
 
 def _verdict(run: RunSummary) -> str:
@@ -293,6 +295,7 @@ def _pane(pair: PairRow, drawn: Drawn | None) -> View:
         "to": str(pair.outcome.to_ns),
         "meaning": MEANINGS.get(pair.reason, ""),
         "text": pair.text,
+        "command": pair_command(pair.run.summary, *pair.seconds) if pair.tried else "",
         "evidence": [(row.key, row.value, _rounded(row.weight)) for row in evidence.readings],
         "total": _rounded(evidence.total),
         "least": _rounded(evidence.least),

@@ -120,6 +120,18 @@ function browse(article) {
     figure.querySelector("figcaption").textContent = (pair.from === pair.to ? seconds[0] : seconds.join(" ↔ ")) + (pair.lacking && ". " + pair.lacking);
   }
 
+  // Without a secure page, as of file://, some browsers have no clipboard: then the command is selected.
+  function showCommand(command) {
+    const again = part(".again"), code = again.querySelector("code"), button = again.querySelector("button");
+    again.hidden = !command;
+    code.textContent = command;
+    button.textContent = "copy";
+    button.onclick = () => {
+      getSelection().selectAllChildren(code);
+      navigator.clipboard?.writeText(command).then(() => (button.textContent = "copied"), () => {});
+    };
+  }
+
   function open(key) {
     const pair = data.pairs[key], row = rows.find((other) => other.dataset.pair === key);
     const seconds = [row.dataset.from, row.dataset.to].map((text) => parseFloat(text).toFixed(1) + " s");
@@ -132,6 +144,7 @@ function browse(article) {
     picture(part(".over"), data.overlays[key]);
     part(".blind").hidden = Boolean(data.moments[pair.from] || data.moments[pair.to]);
     listEvidence(pair);
+    showCommand(pair.command);
     for (const link of article.querySelectorAll("[data-of]")) link.classList.toggle("chosen", link.dataset.of === key);
     if (!pane.open) pane.showModal();
     pane.dataset.pair = key;
