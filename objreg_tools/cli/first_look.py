@@ -28,9 +28,16 @@ class FirstLook:
 
 def look(rehearse: Callable[[Callable[[int], None]], Run], frames: int = FRAMES) -> FirstLook:
     """Call ``rehearse``, which reports how many of at most so many ``frames`` are through."""
+    through = 0
     with tqdm(total=frames, unit="frame", desc="looking at frames", disable=None, leave=False) as bar:
+
+        def show(count: int) -> None:
+            nonlocal through
+            bar.update(count - through)
+            through = count  # a bar that is not shown counts nothing
+
         try:
-            run = rehearse(lambda count: bar.update(count - bar.n))
+            run = rehearse(show)
         except ValueError as error:  # a file that is broken in its middle: a run has what comes before
-            return FirstLook(Run(), bar.n > 0, (Finding(str(error)),))
+            return FirstLook(Run(), through > 0, (Finding(str(error)),))
     return FirstLook(run, run.frames > 0, found_in(run))

@@ -11,7 +11,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from objreg_tools.cli import FOLDER, SUMMARIES, group, main
+from objreg_tools.cli import FOLDER, SUMMARIES, _module, group, main
 
 
 def test_help_shows_every_command_that_is_there_and_imports_none() -> None:
@@ -25,7 +25,7 @@ def test_help_shows_every_command_that_is_there_and_imports_none() -> None:
 
 
 def test_every_command_has_its_help() -> None:
-    for name in [name for name in SUMMARIES if (FOLDER / f"{name.replace('-', '_')}.py").exists()]:
+    for name in [name for name in SUMMARIES if (FOLDER / f"{_module(name)}.py").exists()]:
         result = CliRunner().invoke(group, [name, "--help"])
         assert result.exit_code == 0 and "Usage:" in result.output, name
 
@@ -33,7 +33,7 @@ def test_every_command_has_its_help() -> None:
 def test_every_file_of_a_command_is_in_the_list() -> None:
     modules = [path.stem for path in FOLDER.glob("*.py")]
     with_command = [name for name in modules if "\ndef command(" in (FOLDER / f"{name}.py").read_text()]
-    assert {name.replace("_", "-") for name in with_command} <= set(SUMMARIES)
+    assert set(with_command) <= set(map(_module, SUMMARIES))
 
 
 def test_an_unknown_command_is_named(capsys: pytest.CaptureFixture[str]) -> None:

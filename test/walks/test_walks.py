@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from report.chromium import chromium
 
-from . import odd_bags, reader, researcher, student
+from . import odd_bags, reader, researcher, student, trying
 from .walk import ROOM, Said, Walk
 
 pytestmark = pytest.mark.ros
@@ -53,6 +53,19 @@ def test_a_student_comes_from_a_tum_folder_to_a_page(room: Path, tmp_path: Path)
     ],
 )
 def test_an_odd_recording_is_put_right_by_what_is_told(way: Any, room: Path, tmp_path: Path) -> None:
+    way(tmp_path, room)
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        trying.a_simulated_recording,
+        trying.wrong_focal_length,
+        trying.wrong_depth_scale,
+        trying.odometry_of_another_robot,
+    ],
+)
+def test_who_tries_a_recording_reads_first_what_is_wrong_with_it(way: Any, room: Path, tmp_path: Path) -> None:
     way(tmp_path, room)
 
 

@@ -118,8 +118,10 @@ def _of_recording(opened: Opened) -> list[Finding]:
 def _ordered(summary: Mapping[str, Any], known: Iterable[Finding]) -> list[Finding]:
     """All findings on a run, those on its recording first; of one section of the troubleshooting page the first."""
     of_stream = [Finding(**row) for row in summary["stream"]]
-    found = {finding.anchor or finding.what: finding for finding in reversed([*of_stream, *known, *find(summary)])}
-    return list(reversed(found.values()))
+    found: dict[str, Finding] = {}
+    for finding in (*of_stream, *known, *find(summary)):
+        found.setdefault(finding.anchor or finding.what, finding)
+    return list(found.values())
 
 
 @aside()

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a pair: it holds what its JSON has, and opens without a network."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from registration.rooms import CAMERA, cast, keyframe, seen_from
+
+from objreg_ros.data.images import DepthImage, Detections
+from objreg_ros.registration.params import RegistrationParams
+from objreg_tools.report.pair.pair_page import Seen, pair_page
+from objreg_tools.report.pair.registered_pair import RegisteredPair, register_pair
+
+NAME = "<kitchen>"
+
+
+@pytest.fixture(scope="module")
+def found() -> RegisteredPair:
+    return register_pair(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2), RegistrationParams())
+
+
+def seen(angle: float) -> Seen:
+    depth = np.nan_to_num(cast(seen_from(angle))[0], posinf=0.0).astype(np.float32)
+    rgb = np.full((*depth.shape, 3), 120, np.uint8)
+    box = Detections(
+        xyxy=np.array([[20, 20, 60, 60]], np.float32),
+        score=np.array([0.5], np.float32),
+        label=("cup",),
+        image_hw=depth.shape,
+        stamp_ns=0,
+    )
+    return Seen(DepthImage(depth=depth, rgb=rgb, intrinsics=CAMERA, stamp_ns=0), box)
+
+
+def text(found: RegisteredPair, *pictures: Seen | None) -> str:
+    return pair_page(NAME, {"start_ns": 0, **found.summary}, found, pictures)
+
+
+def test_a_page_has_both_pictures_the_overlay_and_the_matches(found: RegisteredPair) -> None:
+    page = text(found, seen(0.0), seen(20.0))
+    assert page.count("data:image/jpeg") == 4 and "http" not in page.replace("http://www.w3.org", "")
+    assert "&lt;kitchen&gt;, one pair" in page and NAME not in page
+    assert all(term["phrase"] in page for term in found.summary["odds"]["terms"])
+
+
+def test_a_page_does_without_pictures(found: RegisteredPair) -> None:
+    assert text(found, seen(0.0), None).count("data:image/jpeg") == 1
+    assert "no pictures at these times" in text(found, None, None)
