@@ -25,6 +25,7 @@ NAMES_NO_FILE = {
     "scheduler",
     "what",
     "form",
+    *("first", "second"),  # times of pair
     "sha256",
     "intrinsics",
     "size",

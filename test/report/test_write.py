@@ -85,7 +85,7 @@ def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(
 def chosen(monkeypatch: pytest.MonkeyPatch) -> list[Inputs]:
     """What the pictures of a report are taken from."""
     seen: list[Inputs] = []
-    monkeypatch.setattr("objreg_tools.report.write.Album", lambda recording, inputs, rectified: seen.append(inputs))
+    monkeypatch.setattr("objreg_tools.report.write.Album", lambda recording, inputs, *_: seen.append(inputs))
     return seen
 
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from objreg_tools.recording import Record, open_recording, write_rosbag2
 
 from .walk import Walk
@@ -33,10 +35,10 @@ def wrong_focal_length(folder: Path, room: Path) -> None:
     """A camera_info of another picture."""
 
     def change(message: Any) -> None:
-        for k in (0, 4):
-            message.k[k] *= FOCAL
-        for k in (0, 5):
-            message.p[k] *= FOCAL
+        k, p = np.array(message.k), np.array(message.p)
+        k[[0, 4]] *= FOCAL
+        p[[0, 5]] *= FOCAL
+        message.k, message.p = k, p
 
     _tries(folder, room, {"/camera_info": change}, "camera-focal-length", "times the focal length")
 

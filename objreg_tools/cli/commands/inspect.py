@@ -12,7 +12,7 @@ import click
 from objreg_ros.memory.store_file import is_store
 from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import NOTHING, options
-from objreg_tools.cli.first_look import look
+from objreg_tools.cli.looks.first_look import look
 from objreg_tools.cli.paths import OutputPath
 from objreg_tools.cli.run_output import notify, print_next
 from objreg_tools.recording import Recording, open_recording

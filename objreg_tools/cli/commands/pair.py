@@ -21,8 +21,15 @@ from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import options
 from objreg_tools.cli.commands.inspect import columns
-from objreg_tools.cli.moments import KeepsFrames, Remembering, first_stamp_ns, frame_at, keyframe_of, records_about
-from objreg_tools.cli.moments import stamp_of as stamp_ns_of
+from objreg_tools.cli.looks.moments import (
+    KeepsFrames,
+    Remembering,
+    first_stamp_ns,
+    frame_at,
+    keyframe_of,
+    records_about,
+)
+from objreg_tools.cli.looks.moments import stamp_of as stamp_ns_of
 from objreg_tools.cli.paths import OutputPath
 from objreg_tools.cli.recorded import Opened, RecordedOptions
 from objreg_tools.cli.run_output import json_to

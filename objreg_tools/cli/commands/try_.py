@@ -16,9 +16,9 @@ from tqdm import tqdm
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import options
-from objreg_tools.cli.assumed import assumed
 from objreg_tools.cli.browser import open_page
-from objreg_tools.cli.first_look import look
+from objreg_tools.cli.looks.assumed import assumed
+from objreg_tools.cli.looks.first_look import look
 from objreg_tools.cli.paths import OutputPath
 from objreg_tools.cli.recorded import BY_TRACKING, Opened, RecordedOptions
 from objreg_tools.cli.run_output import exit_code, notify, print_reasons, print_trajectory

@@ -85,7 +85,7 @@ def test_what_the_run_does_not_find_again_is_said(model: Path, tmp_path: Path, m
 
 
 def try_look(*findings: Finding) -> object:
-    from objreg_tools.cli.first_look import FirstLook
+    from objreg_tools.cli.looks.first_look import FirstLook
     from objreg_tools.offline.run import Run
 
     return FirstLook(Run(), True, findings)

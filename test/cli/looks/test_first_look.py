@@ -4,7 +4,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from objreg_ros.plausibility.finding import Finding
-from objreg_tools.cli.first_look import look
+from objreg_tools.cli.looks.first_look import look
 from objreg_tools.offline.run import Run
 
 WRONG = Finding("the focal length is another", "c", "t", "camera-focal-length")

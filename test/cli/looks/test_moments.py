@@ -9,7 +9,7 @@ from recording.sample_folders import tum_folder
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_tools.cli.moments import KeepsFrames, first_stamp_ns, frame_at, keyframe_of, records_about, stamp_of
+from objreg_tools.cli.looks.moments import KeepsFrames, first_stamp_ns, frame_at, keyframe_of, records_about, stamp_of
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 from objreg_tools.offline.stages import Stages

@@ -6,7 +6,7 @@ from pathlib import Path
 from recording.sample_folders import tum_folder
 from recording.vision import detected_bag
 
-from objreg_tools.cli.assumed import REGISTERED, assumed
+from objreg_tools.cli.looks.assumed import REGISTERED, assumed
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 from objreg_tools.offline.run import Run
