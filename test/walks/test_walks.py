@@ -25,6 +25,14 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulated recording of so many frames a second that its motion can be followed."""
+    folder = tmp_path_factory.mktemp("moving")
+    Walk(folder).type("simulate", "room", *trying.MOVING)
+    return folder / "room"
+
+
+@pytest.fixture(scope="module")
 def study(room: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder in which the researcher has worked."""
     folder = tmp_path_factory.mktemp("study")
@@ -59,14 +67,17 @@ def test_an_odd_recording_is_put_right_by_what_is_told(way: Any, room: Path, tmp
 @pytest.mark.parametrize(
     "way",
     [
-        trying.a_simulated_recording,
         trying.wrong_focal_length,
         trying.wrong_depth_scale,
         trying.odometry_of_another_robot,
     ],
 )
-def test_who_tries_a_recording_reads_first_what_is_wrong_with_it(way: Any, room: Path, tmp_path: Path) -> None:
-    way(tmp_path, room)
+def test_who_tries_a_recording_reads_first_what_is_wrong_with_it(way: Any, moving: Path, tmp_path: Path) -> None:
+    way(tmp_path, moving)
+
+
+def test_who_tries_a_recording_has_a_page_and_goes_on_to_a_pair(room: Path, tmp_path: Path) -> None:
+    trying.a_simulated_recording(tmp_path, room)
 
 
 def test_a_researcher_compares_two_runs_and_reads_what_they_wrote(study: Path) -> None:
