@@ -37,7 +37,10 @@ def __getattr__(name: str) -> Any:
     """The public names, loaded when the first of them is asked for: a message needs none of what they load."""
     if name not in __all__:
         raise AttributeError(f"module 'objreg_ros' has no attribute {name!r}")
-    from objreg_ros import library
+    from objreg_ros.terminal import progress
+
+    with progress("loading the library"):
+        from objreg_ros import library
 
     return getattr(library, name)
 

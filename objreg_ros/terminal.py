@@ -5,8 +5,11 @@ from __future__ import annotations
 
 import re
 import sys
+import threading
+import time
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, TextIO
 
 KEPT = "\n\t"
@@ -60,3 +63,29 @@ def protect_terminal() -> None:
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, PlainStream):
             setattr(sys, name, PlainStream(stream))
+
+
+@contextmanager
+def progress(what: str, after_s: float = 1.0) -> Iterator[None]:
+    """Say on standard error what is done, where it takes longer than ``after_s``, and at its end how long it took."""
+    began, shown = time.monotonic(), threading.Event()
+
+    def show() -> None:
+        shown.set()
+        _note(f"objreg_ros: {what} …")
+
+    timer = threading.Timer(after_s, show)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+        if shown.is_set():
+            _note(f"objreg_ros: {what}: {time.monotonic() - began:.1f} s")
+
+
+def _note(line: str) -> None:
+    if sys.stderr is not None:  # as behind pythonw
+        print(printable(line), file=sys.stderr, flush=True)

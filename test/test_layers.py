@@ -142,7 +142,7 @@ def allowed_in_ros(importer: str, imported: str) -> bool:
     """What a module of the robot's package may import: nothing of the other two."""
     stage = importer.split(".")[0]
     if importer == "":  # what `import objreg_ros` offers, loaded when it is asked for
-        return imported in ("library", "kernel_cache")
+        return imported in ("library", "terminal")
     if below(importer, "data"):
         return below(imported, "data", "limits")
     if importer in CORE:

@@ -6,8 +6,10 @@ from __future__ import annotations
 import io
 import os
 import pty
+import re
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,7 +18,7 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 from tqdm import tqdm
 
-from objreg_ros.terminal import PlainStream, printable, protect_terminal
+from objreg_ros.terminal import PlainStream, printable, progress, protect_terminal
 
 HOSTILE = "cup\x1b[2J\x1b]0;title\x07\x00\x9b31m\u202e"
 SHOWN = r"cup\x1b[2J\x1b]0;title\x07\x00\x9b31m\u202e"
@@ -57,6 +59,23 @@ def test_streams_are_protected_once(monkeypatch: pytest.MonkeyPatch) -> None:
     protected = sys.stdout
     protect_terminal()
     assert sys.stdout is protected and isinstance(protected, PlainStream) and sys.stderr is None
+
+
+def test_what_takes_long_is_named_with_its_time_and_what_does_not_is_silent(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress("reading a cup", after_s=60):
+        pass
+    assert capsys.readouterr() == ("", "")
+    with progress(f"reading {HOSTILE}", after_s=0.01):
+        time.sleep(0.2)
+    began, ended = capsys.readouterr().err.splitlines()
+    assert began == f"objreg_ros: reading {SHOWN} …" and re.fullmatch(r"objreg_ros: reading .*: 0\.[2-9] s", ended)
+
+
+def test_an_error_in_what_is_done_is_raised_and_nothing_is_said_later(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(ValueError, match="no cup"), progress("reading", after_s=0.1):
+        raise ValueError("no cup")
+    time.sleep(0.2)
+    assert capsys.readouterr().err == ""
 
 
 def hostile_bag(path: Path) -> Path:

@@ -34,6 +34,7 @@ from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.terminal import progress
 
 RECENT = 500  # landmarks that are reported after every keyframe
 
@@ -50,10 +51,13 @@ class Registrar:
         self.params = self._adopted = params
         self._method, self._gate = method or method_of(params), gate
         self._confirm_seconds = params.confirm_seconds if gate is None else 0.0
-        self._store, self._lock = Store(params.store), threading.RLock()
+        self._lock = threading.RLock()
+        with progress(f"opening the store {params.store}"):
+            self._store = Store(params.store)
         self._pools = Pools(params.threads)
         try:
-            self._start(self._store.next_session())
+            with progress("reading the objects of the store"):
+                self._start(self._store.next_session())
         except BaseException:  # a damaged store: others may have it
             self.close()
             raise
