@@ -32,9 +32,11 @@ from objreg_ros.registration.params import RegistrationParams
 from objreg_ros.registration.result import Registration
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.segmenter.sensor.organise import organise
+from objreg_ros.segmenter.sensor.organise import FAR, CloudError, organise
+from objreg_ros.terminal import progress
 
 NO_DEPTH_MM = 65535  # what drivers send where nothing was measured, beside 0
+CLOUD = "give points in metres in the optical frame of the camera that saw them (x right, y down, z forward)"
 
 Found = Detections | Sequence[tuple[Any, str, float]]
 """Detections, or ``(where, label, score)`` of each object: where is a box x_min y_min x_max y_max in pixels, half open,
@@ -101,7 +103,7 @@ def register(
 
     ``T_1_2`` of what comes back maps points of camera 2 into camera 1. Where the answer is no, ``accepted`` is False,
     ``T_1_2`` and ``covariance`` are None, and ``reason``, ``detail`` and ``evidence`` say why. ValueError, with
-    expected and got, for input of another shape, type or range.
+    expected and got, for input of another shape, type or range, and for metres that must be millimetres.
     """
     known_1, known_2 = _two(detections)
     with _named("picture 1"):
@@ -219,7 +221,8 @@ def _segmenter(unnamed: bool) -> Segmenter:
 
 @cache
 def _model() -> Detector:
-    return Detector.of(DetectorParams(), share.model)
+    with progress("loading the detector's model"):
+        return Detector.of(DetectorParams(), share.model)
 
 
 def _detect(rgb: Array) -> Detections:
@@ -271,7 +274,17 @@ def _metres(depth: Array) -> Array:
         raise ValueError(f"depth: expected {expected}, got {depth.dtype} of shape {depth.shape}")
     if depth.dtype == np.uint16:
         return np.where(depth == NO_DEPTH_MM, 0, depth).astype(np.float32) / np.float32(1000)
-    return np.where(np.isfinite(depth), depth, 0).astype(np.float32)
+    metres = np.where(np.isfinite(depth), depth, 0).astype(np.float32)
+    _require_metres("depth", metres, "depth * 0.001, or millimetres as uint16")
+    return metres
+
+
+def _require_metres(name: str, z: Array, remedy: str) -> None:
+    """Lengths along the optical axis, 0 and NaN for none, that no camera sees: ValueError that asks for the unit."""
+    seen = np.abs(z[np.isfinite(z) & (z != 0)])
+    if len(seen) and (middle := float(np.median(seen))) > FAR:
+        expected = f"metres, of which a camera sees less than {FAR:g}"
+        raise ValueError(f"{name}: expected {expected}, got a median of {middle:g}: millimetres? Then give {remedy}")
 
 
 def _colour(rgb: Array, shape: tuple[int, ...]) -> Array:
@@ -295,8 +308,14 @@ def _organised(xyz: Array, rgb: Array | None, camera: Camera | None) -> DepthIma
         if min(size) <= 0:
             raise ValueError(f"camera: expected a width and height for points (N, 3), got {size[1]} x {size[0]}")
         intrinsics = camera.intrinsics(*size)
+    elif xyz.ndim == 2:
+        raise ValueError("camera: expected one with a width and height for points (N, 3), got None")
     points = xyz.astype(np.float32).reshape(-1, *xyz.shape[-2:])
-    return organise(PointCloud(xyz=points, rgb=rgb, stamp_ns=0), intrinsics)
+    _require_metres("xyz", points[..., 2], "xyz * 0.001")
+    try:
+        return organise(PointCloud(xyz=points, rgb=rgb, stamp_ns=0), intrinsics)
+    except CloudError as error:
+        raise ValueError(f"xyz: {error.fact}; {CLOUD}") from error
 
 
 def _fused(frames: Sequence[Frame], name: str, params: RegistrationParams) -> tuple[Keyframe, Array]:

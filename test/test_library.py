@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -191,12 +192,17 @@ def pictures(**changed: Any) -> Callable[[], Registration]:
     return lambda: register(**{"detections": MASKS, **given, **changed})
 
 
+def clouds(xyz: np.ndarray, camera: Camera | None = None) -> Callable[[], Registration]:
+    return lambda: register_clouds(xyz, None, TWO.xyz, None, camera, detections=([], []))
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (pictures(depth_2=ONE.depth.astype(np.int32)), r"picture 2: depth: expected float .* got int32 of shape \(120"),
         (pictures(depth_1=ONE.depth[..., None]), r"picture 1: depth: expected .* got float32 of shape \(120, 160, 1\)"),
         (pictures(depth_1=-ONE.depth), "picture 1: DepthImage: expected depth of 0 to"),
+        (pictures(depth_2=1000 * ONE.depth), r"picture 2: depth: expected metres.*millimetres\? .*depth \* 0\.001"),
         (pictures(rgb_2=TWO.rgb[::2]), r"picture 2: rgb: expected uint8 of shape \(120, 160, 3\), got uint8 of"),
         (pictures(rgb_1=ONE.rgb / 255.0), r"picture 1: rgb: expected uint8 .* got float64"),
         (pictures(camera=replace(SIZED, width=640)), "picture 1: camera: expected the picture's size 160 x 120"),
@@ -211,13 +217,28 @@ def pictures(**changed: Any) -> Callable[[], Registration]:
             lambda: register_clouds(ONE.xyz.reshape(-1, 3), None, TWO.xyz, None, CAMERA, detections=MASKS),
             r"cloud 1: camera: expected a width and height for points \(N, 3\), got 0 x 0",
         ),
+        (clouds(ONE.xyz * 1000), r"cloud 1: xyz: expected metres.*millimetres\? .*xyz \* 0\.001"),
+        (clouds(ONE.xyz.reshape(-1, 3)), r"cloud 1: camera: expected one with a width and height .*, got None"),
+        (clouds(-ONE.xyz), r"cloud 1: xyz: .* with negative z; give points in metres in the optical frame"),
+        (clouds(ONE.xyz[:2, :2]), r"cloud 1: xyz: expected at least 30 measured points .*; give points in metres"),
+        (clouds(ONE.xyz[..., [2, 0, 1]]), r"cloud 1: xyz: expected pixels that fit a pinhole camera .*; give points"),
+        (clouds(ONE.xyz[..., [2, 0, 1]], CAMERA), r"cloud 1: xyz: expected .*; give points in metres"),
+        (clouds(ONE.xyz.reshape(-1, 3) + np.float32([9, 0, 0]), SIZED), r"cloud 1: xyz: expected points within the"),
     ],
 )
 def test_bad_input_is_refused_with_what_was_expected_and_what_came(
     call: Callable[[], Registration], message: str
 ) -> None:
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=message) as refused:
         call()
+    assert not re.search(r"/tf|camera_info|topic|publish|frame_id|\bROS\b", str(refused.value))
+
+
+@pytest.mark.parametrize("metres", [0.4, 5.0, 60.0])
+def test_depth_that_a_camera_sees_is_metres(metres: float) -> None:
+    depth = np.full(ONE.depth.shape, metres, np.float32)
+    depth[0] = 1e4  # as some drivers mark what is too far
+    assert segment(ONE.rgb, depth, CAMERA, detections=[]).objects == ()
 
 
 def test_an_empty_mask_is_no_object() -> None:

@@ -20,6 +20,14 @@ FIT_ERROR_PX = 1.5  # the median distance that a pixel may have from where the f
 TURN = "publish /tf_static between its frame and that of the picture, or the cloud in the optical frame of its camera"
 
 
+class CloudError(ValueError):
+    """A cloud that is no picture: the ``fact`` is what was expected and got, and ``advice`` is for a node's user."""
+
+    def __init__(self, fact: str, advice: str = "") -> None:
+        super().__init__(f"{fact}; {advice}" if advice else fact)
+        self.fact = fact
+
+
 def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthImage:
     """The depth image of a cloud.
 
@@ -27,8 +35,8 @@ def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthIm
     the points in their pixels) the camera is fitted to the cloud's own points. An unorganised cloud (H = 1) is
     projected with ``intrinsics``, the nearest point of a pixel wins; a thinned one gives the smaller image
     that its points fill. NaN, infinity, 0 and 65535 are "no depth".
-    Raises ValueError when the camera is not known and cannot be fitted, when nothing was measured, and when the points
-    do not lie in front of the camera or in their pixels (the cloud is not in an optical frame).
+    Raises `CloudError`, a ValueError, when the camera is not known and cannot be fitted, when nothing was measured, and
+    when the points do not lie in front of the camera or in their pixels (the cloud is not in an optical frame).
     """
     xyz = cloud.xyz
     measured = _measured(xyz)
@@ -43,9 +51,9 @@ def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthIm
         depth, rgb = np.where(in_front, xyz[..., 2], np.float32(0)), cloud.rgb
     else:
         if intrinsics is None:
-            raise ValueError(
-                f"an unorganised cloud of {xyz.shape[1]} points: expected camera_info to project it with, got none; "
-                "publish camera_info beside the cloud, or an organised cloud"
+            raise CloudError(
+                f"an unorganised cloud of {xyz.shape[1]} points: expected a camera to project it with, got none",
+                "publish camera_info beside the cloud, or an organised cloud",
             )
         colours = None if cloud.rgb is None else cloud.rgb[0][in_front[0]]
         depth, rgb, intrinsics = _project(xyz[0][in_front[0]], colours, intrinsics)
@@ -62,11 +70,12 @@ def _require_in_front(z: Array, measured: Array) -> None:
     count = int(np.count_nonzero(measured))
     in_front = int(np.count_nonzero(z[measured] > 0))
     if count == 0:
-        raise ValueError(f"expected measured points, got {z.size} points that are all NaN, 0 or 65535")
+        raise CloudError(f"expected measured points, got {z.size} points that are all NaN, 0 or 65535")
     if in_front < count / 2:
-        raise ValueError(
-            f"expected a cloud in the optical frame (x right, y down, z forward) with points in front of the camera, "
-            f"got {count - in_front} of {count} points with negative z; {TURN}"
+        raise CloudError(
+            "expected a cloud in the optical frame (x right, y down, z forward) with points in front of the camera, "
+            f"got {count - in_front} of {count} points with negative z",
+            TURN,
         )
 
 
@@ -78,9 +87,9 @@ def fit_intrinsics(xyz: Array, valid: Array) -> Intrinsics:
     """
     rows, cols = np.nonzero(valid)
     if len(rows) < MIN_FIT:
-        raise ValueError(
-            f"expected at least {MIN_FIT} measured points to fit the camera of an organised cloud, got {len(rows)}; "
-            "publish camera_info beside the cloud"
+        raise CloudError(
+            f"expected at least {MIN_FIT} measured points to fit the camera of an organised cloud, got {len(rows)}",
+            "publish camera_info beside the cloud",
         )
     step = max(1, len(rows) // 20000)
     rows, cols = rows[::step], cols[::step]
@@ -89,10 +98,10 @@ def fit_intrinsics(xyz: Array, valid: Array) -> Intrinsics:
     fy, cy, error_v = _fit_line(y / z, rows)
     error = max(error_u, error_v)
     if not error <= FIT_ERROR_PX or fx <= 0 or fy <= 0:
-        raise ValueError(
+        raise CloudError(
             f"expected pixels that fit a pinhole camera to {FIT_ERROR_PX} px, got {error:.3g} px with "
-            f"fx {fx:.4g}, fy {fy:.4g}: its rows and columns are no picture along z, as in a frame with x forward; "
-            f"{TURN}, or publish camera_info and the cloud as unorganised (height 1)"
+            f"fx {fx:.4g}, fy {fy:.4g}: its rows and columns are no picture along z, as in a frame with x forward",
+            f"{TURN}, or publish camera_info and the cloud as unorganised (height 1)",
         )
     height, width = valid.shape
     return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=width, height=height)
@@ -116,9 +125,10 @@ def _fitted_instead(xyz: Array, valid: Array, camera: Intrinsics) -> Intrinsics:
         return fit_intrinsics(xyz, valid)
     except ValueError as error:
         off = _error_px(xyz, valid, camera)
-        raise ValueError(
-            "expected an organised cloud in the optical frame (x right, y down, z forward) of its camera_info, got one "
-            f"whose points lie {off:.3g} px beside their pixels; {TURN}"
+        raise CloudError(
+            "expected an organised cloud in the optical frame (x right, y down, z forward) of its camera, got one "
+            f"whose points lie {off:.3g} px beside their pixels",
+            TURN,
         ) from error
 
 
@@ -155,9 +165,9 @@ def _project(points: Array, rgb: Array | None, camera: Intrinsics) -> tuple[Arra
 def _require_in_image(points: Array, camera: Intrinsics) -> None:
     seen = len(_pixels(points, camera)[1])
     if seen < max(1.0, IN_IMAGE * len(points)):
-        raise ValueError(
-            f"expected points within the {camera.width}x{camera.height} image, got {seen} of {len(points)} there; "
-            f"is it in the optical frame of this camera (x right, y down, z forward)? If not, {TURN}"
+        raise CloudError(
+            f"expected points within the {camera.width}x{camera.height} image, got {seen} of {len(points)} there",
+            f"is it in the optical frame of this camera (x right, y down, z forward)? If not, {TURN}",
         )
 
 

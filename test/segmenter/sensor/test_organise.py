@@ -120,7 +120,7 @@ def test_a_cloud_thinned_from_any_pixel_on_keeps_its_points_on_their_rays(step: 
     [
         (np.full((48, 64, 3), np.nan, np.float32), CAMERA, "expected measured points, got 3072"),
         (-np.array(back_project(hilly_depth(), 300, 310, 30, 23)), CAMERA, "negative z"),
-        (np.ones((1, 9, 3), np.float32), None, "expected camera_info"),
+        (np.ones((1, 9, 3), np.float32), None, "expected a camera to project it with, got none; publish camera_info"),
         (np.ones((48, 64, 3), np.float32), None, "expected pixels that fit a pinhole camera"),
         (np.array([[[9, 9, 1], [9, 8, 1]]], np.float32), CAMERA, "expected points within the 64x48 image"),
         (np.ones((2, 2, 3), np.float32), None, "expected at least 30 measured points"),
@@ -171,5 +171,5 @@ def test_a_cloud_with_x_forward_is_refused_with_what_to_publish(
     optical = np.array(cloud_of(hilly_depth()).xyz) - np.array([0.0, lower, 0.0], np.float32)
     body = optical @ np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]], np.float32).T
     body = body if organised else body.reshape(1, -1, 3)
-    with pytest.raises(ValueError, match=r"publish /tf_static between its frame|expected camera_info"):
+    with pytest.raises(ValueError, match=r"publish /tf_static between its frame|publish camera_info"):
         organise(PointCloud(xyz=body, rgb=None, stamp_ns=0, frame_id="body"), camera)
