@@ -10,19 +10,34 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
+
+from objreg_ros.data.images import Intrinsics
+from objreg_ros.geometry import back_project
+from objreg_tools.report.exports.ply import write_ply
+from objreg_tools.simulation.rendering.render import Rendering, render
+from objreg_tools.simulation.scenarios import make_plan
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 SAYS = {
     "pair.py": "accepted",
     "stream.py": "closed",
+    "png_pair.py": "accepted",
+    "ply_pair.py": "accepted",
     "own_detector.py": "masks: moved",
     "own_gate.py": "several: Reason.FEW_OBJECTS",
     "consume_constraints.py": "EDGE_SE3:QUAT 0 1",
     "objreg_to_gtsam.py": "solved: the second camera is at [0.1, 0.0, 0.02] m",
     "solve_g2o.py": "0.500000000 0.000000000 0.000000000 1.000000000",
 }
-NEEDS = {"consume_constraints.py": "rclpy", "objreg_to_gtsam.py": "gtsam", "solve_g2o.py": "gtsam"}
+NEEDS = {
+    "ply_pair.py": "open3d",
+    "consume_constraints.py": "rclpy",
+    "objreg_to_gtsam.py": "gtsam",
+    "solve_g2o.py": "gtsam",
+}
 MOST_LINES = 40
 MOST_BYTES = 400_000  # of the notebook with its pictures
 PATIENCE_S = 900  # where every kernel has to be compiled first
@@ -36,6 +51,48 @@ def run(*arguments: str, text: str | None = None) -> str:
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def shots() -> list[Rendering]:
+    """Two pictures of a simulated room that lie a little beside each other."""
+    plan = make_plan("orbit", seed=7, frames=120)
+    return [render(plan.scenes[0], plan.T_world_camera[k], seed=k, threads=2) for k in (0, 8)]
+
+
+def numbers(camera: Intrinsics, *names: str) -> list[str]:
+    return [str(getattr(camera, name)) for name in names]
+
+
+def draw_png(folder: Path) -> list[str]:
+    """What `png_pair.py` is called with: pictures in files, depth in millimetres, and their camera."""
+    files = []
+    for k, shot in enumerate(shots()):
+        assert shot.rgb is not None
+        files += [str(folder / f"{kind}_{k}.png") for kind in ("rgb", "depth")]
+        cv2.imwrite(files[-2], cv2.cvtColor(shot.rgb, cv2.COLOR_RGB2BGR))
+        cv2.imwrite(files[-1], (1000 * shot.depth).round().astype(np.uint16))
+    return [*files, *numbers(shot.intrinsics, "fx", "fy", "cx", "cy")]
+
+
+def draw_ply(folder: Path) -> list[str]:
+    """What `ply_pair.py` is called with: clouds in files without what was not measured, and their camera."""
+    files = []
+    for k, shot in enumerate(shots()):
+        assert shot.rgb is not None
+        camera, seen = shot.intrinsics, shot.depth > 0
+        xyz = back_project(shot.depth, camera.fx, camera.fy, camera.cx, camera.cy)
+        files.append(str(write_ply(folder / f"{k}.ply", xyz[seen], rgb=shot.rgb[seen])))
+    return [*files, *numbers(camera, "fx", "fy", "cx", "cy", "width", "height")]
+
+
+DRAWN = {"png_pair.py": draw_png, "ply_pair.py": draw_ply}
+
+
+def skip_without(name: str) -> None:
+    """Skip the example of this name where what it needs is not installed."""
+    needed = NEEDS.get(name)
+    if needed is not None and find_spec(needed) is None:
+        pytest.skip(f"{name} needs {needed}, which is not installed")
 
 
 def cells(kind: str) -> list[str]:
@@ -55,11 +112,26 @@ def test_an_example_is_short(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SAYS)
-def test_an_example_runs_and_says_what_it_found(name: str) -> None:
-    needed = NEEDS.get(name)
-    if needed is not None and find_spec(needed) is None:
-        pytest.skip(f"{name} needs {needed}, which is not installed")
-    assert SAYS[name] in run(str(EXAMPLES / name))
+def test_an_example_runs_and_says_what_it_found(name: str, tmp_path: Path) -> None:
+    skip_without(name)
+    words = DRAWN[name](tmp_path) if name in DRAWN else []
+    assert SAYS[name] in run(str(EXAMPLES / name), *words)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_an_example_that_reads_files_says_how_it_is_called_and_what_a_file_lacks(name: str, tmp_path: Path) -> None:
+    skip_without(name)
+    files = [str(tmp_path / "none")] * (4 if name == "png_pair.py" else 2)
+    for words, expected in [([], "FX FY CX CY"), ([*files, *["1"] * (8 - len(files))], "none: expected a")]:
+        done = subprocess.run(
+            [sys.executable, str(EXAMPLES / name), *words],
+            env={**os.environ, "PYTHONPATH": str(EXAMPLES.parent)},
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE_S,
+            check=False,
+        )
+        assert done.returncode == 1 and expected in done.stderr and "Traceback" not in done.stderr
 
 
 def test_the_notebook_is_one_and_is_small() -> None:
