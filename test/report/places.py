@@ -53,3 +53,16 @@ def told(from_s: float, to_s: float, label: str = "cup", metres: float = 0.4) ->
 def at(x: float) -> tuple[ObjectCloud, ...]:
     """A book that stays and a cup at ``x``."""
     return box("book", (-0.5, 0, 1), instance=2), box("cup", (x, 0, 1))
+
+
+def tying(from_s: float, to_s: float, from_session: int, to_session: int, x: float) -> LoopClosure:
+    """A closure of two sessions, with the camera at *to* so far along x of that at *from*."""
+    return LoopClosure(
+        from_ns=round(from_s * SECOND),
+        to_ns=round(to_s * SECOND),
+        T_from_to=moved(x),
+        covariance=np.eye(6) * 1e-4,
+        labels=("book",),
+        from_session=from_session,
+        to_session=to_session,
+    )

@@ -17,6 +17,7 @@ from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.sensor import measured_noise
 from objreg_tools.report.store.moved_objects import Move, Moves, moves_in
+from objreg_tools.report.store.session_ties import SessionTie, joined, ties_in
 
 MOST_VIEWS = 100  # are read for the noise of their depth
 
@@ -31,6 +32,7 @@ class StoreSummary:
     landmarks: tuple[Landmark, ...]
     sightings: tuple[Sighting, ...]
     moves: Moves
+    ties: tuple[SessionTie, ...]
     depth_noise: float | None  # median of the views, in that of a Kinect v1; None where none has enough depth
 
     @property
@@ -91,6 +93,7 @@ def survey(path: str | Path) -> StoreSummary:
             landmarks=landmarks.known(),
             sightings=sightings,
             moves=moves_in(store, sightings),
+            ties=ties_in(store, sightings),
             depth_noise=_depth_noise(store),
         )
     finally:
@@ -127,6 +130,8 @@ def describe(found: StoreSummary) -> str:
             f"  session {session['session']}: {session['keyframes']} keyframes, {session['objects']} objects "
             f"in {seconds:.1f} s"
         )
+    for group in joined(found.ties):
+        lines.append(f"  tied together by constraints: sessions {', '.join(map(str, group))}")
     lines += [f"  moved: {sentence}" for sentence in moves_as_text(found)]
     return "\n".join(lines)
 
