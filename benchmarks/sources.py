@@ -55,7 +55,12 @@ class Collector:
 
     frames: list[Frame] = field(default_factory=list)
 
-    tracked = None  # it follows no camera
+    tracked = relocalised = None  # it follows no camera
+    whereabouts = ""
+
+    def counts(self) -> dict[str, int]:
+        """It has no store."""
+        return {}
 
     def process(self, frame: Frame) -> Outcome:
         """Keep it."""

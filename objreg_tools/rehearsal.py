@@ -72,7 +72,11 @@ class _CutsNothing:
 class _ClosesNothing:
     """In place of a registrar."""
 
-    tracked = None
+    tracked = relocalised = None
+    whereabouts = ""
+
+    def counts(self) -> dict[str, int]:
+        return {}
 
     def process(self, frame: Frame) -> Outcome:
         return Outcome()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import LoopClosure, Reason, Rejected
+from objreg_ros.data.closures import LoopClosure, Reason, Rejected, Relocalised
 from objreg_ros.data.frames import Frame, ObjectCloud, View
 from objreg_ros.data.images import ColourImage, DepthImage, Detections
 from objreg_ros.geometry import back_project, inverse
@@ -85,6 +85,11 @@ class Chain:
 
     frames: list[Frame] = field(default_factory=list)
     finished: bool = False
+    relocalised: Relocalised | None = None
+    whereabouts: str = "no closure to an earlier session yet"
+
+    def counts(self) -> dict[str, int]:
+        return {"keyframes": len(self.frames)}
 
     @property
     def tracked(self) -> tuple[int, Array] | None:

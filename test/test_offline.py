@@ -18,7 +18,7 @@ from simple_rooms import OneBox, simple_rooms
 from objreg_ros import pipeline
 from objreg_ros.bridge.camera.frames import FrameTree
 from objreg_ros.bridge.messages import headers, motion_from_msg
-from objreg_ros.data.closures import LoopClosure, Rejected
+from objreg_ros.data.closures import LoopClosure, Rejected, Relocalised
 from objreg_ros.data.frames import Frame
 from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics
 from objreg_ros.detector.detector import Detector
@@ -358,6 +358,39 @@ def test_the_json_has_the_keys_that_others_rely_on() -> None:
     others = [stated["error"] for stated in summary["constraints"][1:]]
     assert others and not any(others)
     assert summary["truth"]["count"] == 1 and summary["truth"]["translation_cm"]["max"] == pytest.approx(10)
+
+
+def test_where_the_camera_is_in_an_earlier_map_is_in_the_json_since_when_it_was_known() -> None:
+    stages, chain = simple_rooms()
+    process, later = chain.process, np.eye(4)
+    later[0, 3] = 2.0
+
+    def place(frame: Frame) -> Any:
+        known = Relocalised(
+            stamp_ns=frame.stamp_ns,
+            session=3,
+            target_ns=7,
+            T_map_odom=np.eye(4),
+            T_map_camera=later,
+            covariance=np.eye(6),
+            closures=2,
+        )
+        chain.relocalised = known if len(chain.frames) == 1 else None  # the second frame, and forgotten after it
+        return process(frame)
+
+    chain.process = place  # type: ignore[method-assign]
+    summary = run_offline(records(4), stages, INPUTS).summary(Truth([]))
+    assert summary["stored"] == {"before": {"keyframes": 0}, "after": {"keyframes": 4}}
+    assert summary["whereabouts"] == "no closure to an earlier session yet"
+    told = summary["relocalised"]
+    assert (told["session"], told["target_ns"], told["closures"]) == (3, 7, 2)
+    assert told["first_ns"] == told["stamp_ns"] == chain.frames[1].stamp_ns and told["T_map_camera"][0][3] == 2.0
+    assert json.loads(json.dumps(told)) == told
+
+
+def test_where_nothing_is_known_of_an_earlier_map_the_json_has_none() -> None:
+    stages, _ = simple_rooms()
+    assert run_offline(records(2), stages, INPUTS).summary(Truth([]))["relocalised"] is None
 
 
 def test_what_the_wire_rounds_is_rounded() -> None:

@@ -227,6 +227,7 @@ class Opened:
             "inputs": self.inputs.outright,
             "odometry": self.odometry,
             "detections_from": self.recorded.topic if self.recorded else None,
+            "store": _resolved(settings.of("registrar", RegistrarParams).store),
             "rectified": segmenter.rectified,
             "camera": absolute(segmenter.camera),
             **self.setting,
@@ -257,3 +258,7 @@ def _require_seed(odometry: str | None) -> None:
     is_drift = odometry is not None and (odometry + ":").startswith(DRIFT)
     if is_drift and not str(odometry).removeprefix(DRIFT).isdecimal():
         raise ValueError(f"--odometry: expected drift: and a seed like drift:1, got {odometry!r}")
+
+
+def _resolved(store: str) -> str:
+    return str(Path(store).expanduser().resolve()) if store else ""

@@ -76,6 +76,7 @@ def print_run(run: Run, summary: Mapping[str, Any]) -> None:
         click.echo(f"  ! {STILL.format(run.glimpses[0]['stamp_ns'])}")
     for stage, ms in summary["stage_ms"].items():
         click.echo(f"  {stage}: {ms['p50']:.1f} ms median, {ms['p95']:.1f} ms p95")
+    print_memory(summary)
     truth = summary["truth"]
     if truth["count"]:
         degrees, centimetres = truth["rotation_deg"], truth["translation_cm"]
@@ -83,6 +84,27 @@ def print_run(run: Run, summary: Mapping[str, Any]) -> None:
                    f"{degrees['max']:.2f}° {centimetres['max']:.1f} cm at most")  # fmt: skip
         shares = ", ".join(f"{truth[name]} {name}" for name in ("strict", "loose", "false"))
         click.echo(f"  of {truth['count']} constraints: {shares}")
+
+
+@aside()
+def print_memory(summary: Mapping[str, Any]) -> None:
+    """What a store in a file held and holds, and whether the camera is in the map of an earlier session."""
+    before, after = summary["stored"]["before"], summary["stored"]["after"]
+    if summary["store"]:
+        click.echo(f"  store {summary['store']}: {_held(before)}; now {_held(after)}")
+    place = summary["relocalised"]
+    if place is not None:
+        click.echo(
+            f"  relocalised in the map of session {place['session']} from the frame of {place['first_ns']} ns on; "
+            f"in the end: {summary['whereabouts']}"
+        )
+    elif summary["store"] and before.get("keyframes"):
+        click.echo(f"  not relocalised: {summary['whereabouts']}")
+
+
+def _held(counts: Mapping[str, int]) -> str:
+    names = ("sessions", "keyframes", "landmarks", "closures")
+    return ", ".join(f"{counts[name]} {name}" for name in names if name in counts)
 
 
 @aside()

@@ -89,6 +89,7 @@ class Line:
         self._mount = Mount(params.registrar.mounting, params.frames, self._on_of_mount)
         self._stream = CameraStream(self._mount, self._on_of_mount)
         self.run.imu_passed_over = self._pipeline.imu.counts
+        self.run.stored_before = stages.registrar.counts()
         self._labels: dict[int, tuple[str, ...]] = {}  # detected in the frames that are in progress
         of_view, slop = params.segmenter, params.registrar.odom_slop
         views = view_streams(of_view.slop, inputs.points is not None, of_view.colour, of_view.level_odom)
@@ -166,6 +167,11 @@ class Line:
         self._segment(self._views.flush())
         self._track(self._frames.flush())
         self._note(self._stages.registrar.finish(self._stream.judge_rest()))
+        self.run.note_place(self._stages.registrar.relocalised)
+        self.run.whereabouts, self.run.stored_after = (
+            self._stages.registrar.whereabouts,
+            self._stages.registrar.counts(),
+        )
         self.run.findings, self.run.measured_mount = self._stream.findings, self._stream.mount
         sensor = self._stages.segmenter.sensor
         self.run.depth_to_colour = sensor.depth_to_colour.text()
@@ -243,6 +249,7 @@ class Line:
             if frame.T_odom_camera is None:
                 self.run.glimpses[-1]["tracked"] = tracked(self._stages.registrar)
             self._note(outcome)
+            self.run.note_place(self._stages.registrar.relocalised)
 
     def _on_of_mount(self, text: str) -> None:
         self.run.mount = text

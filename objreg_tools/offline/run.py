@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closure_fields import fields_of
-from objreg_ros.data.closures import LoopClosure, Rejected
+from objreg_ros.data.closures import LoopClosure, Rejected, Relocalised
 from objreg_ros.data.frames import Frame
 from objreg_ros.pipeline import Segmented
 from objreg_ros.plausibility.finding import Finding
@@ -46,6 +46,11 @@ class Run:
     depth_lag: Lag | None = None  # behind colour; None where it is not known well
     gravity_apart_deg: list[float] = field(default_factory=list)  # IMU and picture, in the frames that have both
     imu_passed_over: Counter[str] = field(default_factory=Counter)  # by reason
+    stored_before: dict[str, int] = field(default_factory=dict)  # in the store, as `Store.counts`
+    stored_after: dict[str, int] = field(default_factory=dict)
+    relocalised: Relocalised | None = None  # the last that was known in the map of an earlier session
+    relocalised_ns: int | None = None  # the stamp of the first frame of which it was known
+    whereabouts: str = ""  # by what it is known in the end, or why it is not
     stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
     def note(self, made: Segmented) -> None:
@@ -58,6 +63,12 @@ class Run:
         self.gravity_from[made.choice.source] += 1
         if made.choice.disagreement_deg is not None:
             self.gravity_apart_deg.append(made.choice.disagreement_deg)
+
+    def note_place(self, place: Relocalised | None) -> None:
+        """Note where the newest frame is in the map of an earlier session, None where that is not known."""
+        if place is not None:
+            self.relocalised = place
+            self.relocalised_ns = place.stamp_ns if self.relocalised_ns is None else self.relocalised_ns
 
     def summary(self, truth: Truth) -> dict[str, Any]:
         """The run as JSON; the keys are stable."""
@@ -78,6 +89,9 @@ class Run:
             "dropped": dict(sorted(self.dropped.items())),
             "complaints": dict(sorted(self.complaints.items())),
             "gravity": self.gravity(),
+            "stored": {"before": self.stored_before, "after": self.stored_after},
+            "relocalised": place_as_json(self.relocalised, self.relocalised_ns),
+            "whereabouts": self.whereabouts,
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
             "truth": summarise(truth.errors(self.closures)),
             "refusals": [fields_of(rejected) for rejected in self.refusals],
@@ -130,6 +144,17 @@ def tracked(registrar: Registers) -> dict[str, Any] | None:
         return None
     session, T_session_camera = registrar.tracked
     return {"session": session, "T_session_camera": T_session_camera.round(6).tolist()}
+
+
+def place_as_json(place: Relocalised | None, first_ns: int | None) -> dict[str, Any] | None:
+    """Where the camera is in the map of an earlier session, and since the frame of which stamp; None as it comes."""
+    if place is None:
+        return None
+    return {
+        "first_ns": first_ns,
+        **{name: getattr(place, name) for name in ("stamp_ns", "session", "target_ns", "closures", "by_odometry")},
+        **{name: getattr(place, name).tolist() for name in ("T_map_odom", "T_map_camera", "covariance")},
+    }
 
 
 def percentiles_ms(seconds: list[float]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import LoopClosure, Rejected
+from objreg_ros.data.closures import LoopClosure, Rejected, Relocalised
 from objreg_ros.data.frames import Frame
 from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.detector.params import DetectorParams
@@ -39,6 +39,20 @@ class Registers(Protocol):
     @property
     def tracked(self) -> tuple[int, Array] | None:
         """The session of the newest frame and where the camera is in it, if that was followed."""
+        ...
+
+    @property
+    def relocalised(self) -> Relocalised | None:
+        """Where the newest frame is in the map of an earlier session."""
+        ...
+
+    @property
+    def whereabouts(self) -> str:
+        """By what that is known, or why it is not."""
+        ...
+
+    def counts(self) -> dict[str, int]:
+        """How much the store holds."""
         ...
 
     def process(self, frame: Frame) -> FrameOutcome: ...

@@ -11,7 +11,15 @@ from click.testing import CliRunner
 from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.plausibility.finding import Finding
 from objreg_tools.cli import NOTHING
-from objreg_tools.cli.run_output import closing_lines, exit_code, json_to, notify, print_next, print_reasons
+from objreg_tools.cli.run_output import (
+    closing_lines,
+    exit_code,
+    json_to,
+    notify,
+    print_memory,
+    print_next,
+    print_reasons,
+)
 from objreg_tools.cli.verbosity import received_by
 
 FINDING = Finding("nothing is seen", "it is dark", "put on the light", "no-detections")
@@ -23,6 +31,25 @@ def test_a_finding_is_a_block_and_a_remark_a_line(capsys: pytest.CaptureFixture[
         "! nothing is seen", "    likely: it is dark", "    next: put on the light",
         "    more: docs/troubleshooting.md#no-detections", "! no odometry",
     ]  # fmt: skip
+
+
+def memory(store: str, keyframes: int, place: dict[str, int] | None) -> dict[str, object]:
+    counts = {"sessions": 1, "keyframes": keyframes, "forgotten": 0}
+    return {"store": store, "stored": {"before": counts, "after": counts}, "relocalised": place, "whereabouts": "why"}
+
+
+def test_a_store_and_the_place_in_its_map_are_lines_and_without_them_there_is_none(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    print_memory(memory("/a.db", 7, {"session": 0, "first_ns": 5}))
+    print_memory(memory("/a.db", 7, None))
+    held = "  store /a.db: 1 sessions, 7 keyframes; now 1 sessions, 7 keyframes"
+    assert capsys.readouterr().out.splitlines() == [
+        held, "  relocalised in the map of session 0 from the frame of 5 ns on; in the end: why",
+        held, "  not relocalised: why",
+    ]  # fmt: skip
+    print_memory(memory("", 0, None))
+    assert capsys.readouterr().out == ""
 
 
 def test_the_next_command_may_be_typed_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:

@@ -189,6 +189,18 @@ def test_a_camera_that_is_told_takes_the_place_of_the_recordings_and_is_named_in
         offline(folder, "--model", model, "--camera", "500,500,320,180,640,360")
 
 
+def test_a_store_is_named_with_what_it_held_and_whether_the_camera_is_in_its_map(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
+    words = (folder, "--model", model, "--json", file, "--set", f"registrar.store={tmp_path / 'place.db'}")
+    first, second = offline(*words), offline(*words)
+    assert f"store {tmp_path / 'place.db'}: 0 sessions, 0 keyframes" in first and "relocalised" not in first
+    assert "place.db: 1 sessions, 2 keyframes" in second
+    assert "not relocalised: no closure to an earlier session yet" in second
+    summary = json.loads(file.read_text())
+    assert summary["store"] == str(tmp_path / "place.db") and summary["stored"]["before"]["sessions"] == 1
+    assert summary["relocalised"] is None and summary["whereabouts"]
+
+
 def test_the_map_of_a_run_is_written(model: Path, tmp_path: Path) -> None:
     folder = tum_folder(tmp_path / "tum", frames=6)
     tum, kitti, g2o, ply = (tmp_path / name for name in ("way.tum", "way.kitti", "graph.g2o", "map.ply"))
