@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-LETTER, LINE = 7.0, 13.0  # px that a letter is wide at most, and a line high
+LETTER, LINE = 8.0, 13.0  # px that a letter is wide at most, and a line high
 GAP = 3.0  # px between a dot and its name
 
 
