@@ -66,7 +66,7 @@ def kernels() -> list[Extension]:
 
 setup(
     name=NAME,
-    version="0.2.0",
+    version="0.3.0",
     description="Object-level loop closure for ROS 2: detect, segment, register, and say no",
     long_description=Path(__file__).resolve().with_name("README.md").read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",

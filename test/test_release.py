@@ -10,6 +10,11 @@ from typing import Any
 
 import yaml
 
+from objreg_mapper.params import MapperParams
+from objreg_ros.data.closures import Reason
+from objreg_ros.registrar.params import RegistrarNodeParams
+from objreg_ros.registration.gate.kinds import KINDS
+
 FORMS = ("bug", "closure", "idea")
 FIELDS = {"checkboxes", "dropdown", "input", "markdown", "textarea"}  # what GitHub knows
 
@@ -69,3 +74,24 @@ def test_the_devcontainer_is_a_stage_of_the_image_for_python(repository: Path) -
     assert f" AS {told['build']['target']}\n" in dockerfile.read_text()
     assert f"useradd --create-home --uid 1000 {told['remoteUser']}\n" in dockerfile.read_text()
     assert (repository / told["postCreateCommand"].split()[0]).is_file()
+
+
+def test_the_badges_are_files_of_this_repository_and_say_what_the_package_says(repository: Path) -> None:
+    readme, setup = (repository / "README.md").read_text(), (repository / "setup.py").read_text()
+    shown = re.findall(r"!\[([^]]+)\]\((docs/badges/[a-z]+\.svg)\)", readme)
+    texts = {file: (repository / file).read_text() for _, file in shown}
+    assert {Path(file).stem for file in texts} == {"licence", "ros", "python"}
+    versions = re.findall(r"Python :: (\d\.\d+)", setup)
+    assert f">{' | '.join(versions)}<" in texts["docs/badges/python.svg"]
+    assert ">Apache-2.0<" in texts["docs/badges/licence.svg"] and 'license="Apache-2.0"' in setup
+    assert ">Jazzy<" in texts["docs/badges/ros.svg"] and "ros-jazzy-rclpy" in setup
+    assert not any("http" in text.replace("http://www.w3.org/2000/svg", "") for text in texts.values())
+
+
+def test_the_notes_of_the_release_name_what_the_evidence_and_the_reasons_are_called_now(repository: Path) -> None:
+    notes = (repository / f"docs/releases/{released(repository)[0]}.md").read_text()
+    renamed = dict(re.findall(r"^\| (?:evidence|reason) \| `(\w+)` \| `(\w+)` \|", notes, re.M))
+    known = {*KINDS, *(reason.value for reason in Reason), "surroundings_score"}
+    assert set(renamed.values()) <= known and not set(renamed) & known
+    dropped = {name for params in (RegistrarNodeParams, MapperParams) for name in params.DROPPED}
+    assert all(f"`{name}`" in notes for name in dropped)
