@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
+import re
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -16,6 +18,7 @@ import pytest
 
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import back_project
+from objreg_ros.registration.gate.kinds import KINDS
 from objreg_tools.report.exports.ply import write_ply
 from objreg_tools.simulation.rendering.render import Rendering, render
 from objreg_tools.simulation.scenarios import make_plan
@@ -147,3 +150,8 @@ def test_the_notebook_is_one_and_is_small() -> None:
 @pytest.mark.slow
 def test_the_cells_of_the_notebook_run_in_their_order() -> None:
     assert "accepted" in run("-", text="\n".join(cells("code")))
+
+
+def test_the_notebook_draws_evidence_by_the_names_that_it_has() -> None:
+    (drawn,) = re.findall(r"names = (\(.*\))", "\n".join(cells("code")))
+    assert set(ast.literal_eval(drawn)) <= {*KINDS, "inliers", "occluded", "violations", "overlap"}
