@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 import threading
 import time
@@ -63,6 +64,11 @@ def protect_terminal() -> None:
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, PlainStream):
             setattr(sys, name, PlainStream(stream))
+
+
+def with_ros2cli(advice: str, otherwise: str) -> str:
+    """``advice`` names a command of ros2cli; ``otherwise`` is for where it is not installed: no wheel brings it."""
+    return advice if shutil.which("ros2") else otherwise
 
 
 @contextmanager

@@ -382,10 +382,10 @@ def test_where_the_camera_is_in_an_earlier_map_is_in_the_json_since_when_it_was_
     summary = run_offline(records(4), stages, INPUTS).summary(Truth([]))
     assert summary["stored"] == {"before": {"keyframes": 0}, "after": {"keyframes": 4}}
     assert summary["whereabouts"] == "no closure to an earlier session yet"
-    told = summary["relocalised"]
-    assert (told["session"], told["target_ns"], told["closures"]) == (3, 7, 2)
-    assert told["first_ns"] == told["stamp_ns"] == chain.frames[1].stamp_ns and told["T_map_camera"][0][3] == 2.0
-    assert json.loads(json.dumps(told)) == told
+    stated = summary["relocalised"]
+    assert (stated["session"], stated["target_ns"], stated["closures"]) == (3, 7, 2)
+    assert stated["first_ns"] == stated["stamp_ns"] == chain.frames[1].stamp_ns and stated["T_map_camera"][0][3] == 2.0
+    assert json.loads(json.dumps(stated)) == stated
 
 
 def test_where_nothing_is_known_of_an_earlier_map_the_json_has_none() -> None:

@@ -18,7 +18,7 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 from tqdm import tqdm
 
-from objreg_ros.terminal import PlainStream, printable, progress, protect_terminal
+from objreg_ros.terminal import PlainStream, printable, progress, protect_terminal, with_ros2cli
 
 HOSTILE = "cup\x1b[2J\x1b]0;title\x07\x00\x9b31m\u202e"
 SHOWN = r"cup\x1b[2J\x1b]0;title\x07\x00\x9b31m\u202e"
@@ -59,6 +59,14 @@ def test_streams_are_protected_once(monkeypatch: pytest.MonkeyPatch) -> None:
     protected = sys.stdout
     protect_terminal()
     assert sys.stdout is protected and isinstance(protected, PlainStream) and sys.stderr is None
+
+
+@pytest.mark.parametrize(("found", "advice"), [("/bin/ros2", "`ros2 topic list`"), (None, "the log")])
+def test_a_command_of_ros2cli_is_advised_where_it_is_installed(
+    found: str | None, advice: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("shutil.which", lambda name: found)
+    assert with_ros2cli("`ros2 topic list`", "the log") == advice
 
 
 def test_what_takes_long_is_named_with_its_time_and_what_does_not_is_silent(capsys: pytest.CaptureFixture[str]) -> None:

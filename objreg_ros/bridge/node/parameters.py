@@ -18,6 +18,7 @@ from rclpy.parameter import Parameter
 
 from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.params import Declaration, Params
+from objreg_ros.terminal import with_ros2cli
 
 Kind = TypeVar("Kind", bound=Params)
 
@@ -109,7 +110,8 @@ def _warn_of_unknown(node: Node, known: Sequence[str]) -> None:
     for name in given:
         if not node.has_parameter(name) and not name.startswith(OF_ROS):
             near = get_close_matches(name, known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"see `ros2 param list {node.get_fully_qualified_name()}`"
+            listed = with_ros2cli(f"see `ros2 param list {node.get_fully_qualified_name()}`", "see `objreg params`")
+            hint = f"did you mean {near[0]}?" if near else listed
             node.get_logger().warning(f"parameter {name} is ignored: this node has none of that name; {hint}")
 
 

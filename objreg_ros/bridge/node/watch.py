@@ -6,6 +6,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from objreg_ros.terminal import with_ros2cli
+
 PERIOD_S = 5.0
 
 
@@ -49,6 +51,8 @@ class Watch:
         heading = f"nothing on {' or '.join(topics.values())} for {seconds:.0f} s"
         if not any(counts.values()):
             remap = " or ".join(f"-r {relative}:=/your/topic" for relative in topics)
-            return f"{heading}: no publisher; see `ros2 topic list`, then remap with --ros-args {remap}"
+            look = with_ros2cli("see `ros2 topic list`, then remap", "see what the driver publishes, then remap")
+            return f"{heading}: no publisher; {look} with --ros-args {remap}"
         alive = ", ".join(full for full, count in counts.items() if count)
-        return f"{heading}: {alive} has a publisher that is silent, or of another QoS: see `ros2 topic info -v {alive}`"
+        look = with_ros2cli(f"see `ros2 topic info -v {alive}`", "see docs/troubleshooting.md#waits-for-a-topic")
+        return f"{heading}: {alive} has a publisher that is silent, or of another QoS: {look}"

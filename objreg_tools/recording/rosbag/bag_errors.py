@@ -40,11 +40,12 @@ DECODERS = {"apsw", "sqlite3", "backports", "compression", "zstandard"}
 REPAIR = {
     ".bag": "`rosbag reindex` repairs a bag that was not closed",
     ".mcap": "`mcap recover` saves what is readable",
-    ".db3": "`sqlite3 old.db3 .recover | sqlite3 new.db3` saves what is readable, `ros2 bag reindex` its metadata",
+    ".db3": "`sqlite3 old.db3 .recover | sqlite3 new.db3` saves what is readable; put it in place of old.db3",
 }
 BEGINS = {".bag": b"#ROSBAG", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite format 3\0"}
 KINDS = {".bag": "a rosbag1", ".mcap": "an mcap", ".db3": "an sqlite3"}
 FOOTER, HEADER = 0x02, 0x01  # records of mcap
+UNINDEXED = "move metadata.yaml away: the files are read without it"
 CHECK = "check the copy, or record it again"
 
 
@@ -109,7 +110,7 @@ def _advice_of_folder(folder: Path, opened: bool) -> str:
     odd = [file for file in files if opened or not is_whole_mcap(file)]
     if odd:
         return advice(odd[0], opened)
-    return "make metadata.yaml anew with `ros2 bag reindex`" if files else "put its files back beside metadata.yaml"
+    return UNINDEXED if files else "put its files back beside metadata.yaml"
 
 
 def is_whole_mcap(path: Path) -> bool:

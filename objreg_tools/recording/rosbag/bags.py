@@ -25,6 +25,7 @@ from rosbags.typesys.store import Typestore
 
 from objreg_tools.recording.record import Record, Recording, Topic
 from objreg_tools.recording.rosbag.bag_errors import (
+    UNINDEXED,
     broken_bag,
     broken_means_value_error,
     is_whole_mcap,
@@ -43,7 +44,6 @@ UNDEFINED = (
     "installed"
 )
 ASSUMED = "the bag does not define {}: read as vision_msgs of version 3 or 4 has it"
-REINDEX = "make metadata.yaml anew with `ros2 bag reindex`, or move it away"
 
 bound_unpacking()
 
@@ -66,7 +66,7 @@ class BagRecording(Recording):
         if not -END_OF_TIME_NS <= self.start_ns <= self.end_ns <= END_OF_TIME_NS:
             self.close()
             got = f"records from {self.start_ns} to {self.end_ns} ns"
-            raise ValueError(f"{path}: expected a whole bag, got: {got}; {REINDEX}")
+            raise ValueError(f"{path}: expected a whole bag, got: {got}; {UNINDEXED}")
 
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None

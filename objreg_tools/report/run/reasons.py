@@ -202,7 +202,8 @@ DROPS = {
     ),
     "late": ReasonText(
         "one of its stream with a later stamp was there before it",
-        "The stream is out of order, or two publishers share its topic: see `ros2 topic info -v`. A few do no harm.",
+        "The stream is out of order, or two publishers share its topic: `ros2 topic info -v` of ros2cli names them. A "
+        "few do no harm.",
     ),
     "time_jump": ReasonText(
         "time jumped back and left it in the future",
@@ -221,7 +222,7 @@ DROPS = {
     "disabled": ReasonText("`~/enable` is false", "Call `~/enable` with true."),
     "inactive": ReasonText(
         "the managed node was not active as it came",
-        "Activate it: `ros2 lifecycle set /detector activate`.",
+        "Activate it, with ros2cli by `ros2 lifecycle set /detector activate`, or set `autostart`.",
         ("detector.autostart",),
     ),
     "reset": ReasonText("`~/reset` came while it waited", "Nothing is wrong."),

@@ -67,8 +67,8 @@ def _drawn_together(one: TiedMap, styles: Mapping[str, str], width: str) -> str:
     plot = Plot.equal(one.points, WIDTHS_TIED[width], least, 2 * most)
     plot.x_axis(f"{one.axes[0]} [m]")
     plot.y_axis(f"{one.axes[1]} [m]")
-    for k, (session, way) in enumerate(one.trajectories):
-        plot.line(way, f"session-{min(k, SERIES)}", f"camera trajectory of session {session}")
+    for k, (session, path) in enumerate(one.trajectories):
+        plot.line(path, f"session-{min(k, SERIES)}", f"camera trajectory of session {session}")
     for earlier, later, here, there in one.ties:
         plot.line(np.array([here, there]), "tie", f"a constraint between sessions {earlier} and {later}")
         plot.dot(here[0], here[1], "tied", f"a constraint between sessions {earlier} and {later}", 2.5)

@@ -32,8 +32,8 @@ class TiedMap:
     @property
     def points(self) -> Array:
         """Everything that is drawn, (N, 2)."""
-        ways = [way for _, way in self.trajectories]
-        return np.concatenate([*ways, np.array([place.xy for place in self.places]).reshape(-1, 2)])
+        paths = [path for _, path in self.trajectories]
+        return np.concatenate([*paths, np.array([place.xy for place in self.places]).reshape(-1, 2)])
 
 
 def tied_maps(found: StoreSummary) -> list[TiedMap]:
@@ -43,19 +43,19 @@ def tied_maps(found: StoreSummary) -> list[TiedMap]:
 
 def _mapped(found: StoreSummary, T_first: dict[int, Array]) -> TiedMap:
     rows = {session: found.by_session[session] for session in T_first}
-    ways = {session: transform(T_first[session], np.array([row.camera for row in of])) for session, of in rows.items()}
+    paths = {session: transform(T_first[session], np.array([row.camera for row in of])) for session, of in rows.items()}
     last: dict[int, tuple[Sighting, int]] = {}
     for of in rows.values():
         for row in of:
             last[row.landmark] = row, 1 + last.get(row.landmark, (row, 0))[1]
     at = {n: transform(T_first[row.session], row.position) for n, (row, _) in sorted(last.items())}
-    spread = np.ptp(np.concatenate([*ways.values(), *(xyz[None] for xyz in at.values())]), axis=0)
+    spread = np.ptp(np.concatenate([*paths.values(), *(xyz[None] for xyz in at.values())]), axis=0)
     plane = sorted(np.argsort(spread, kind="stable")[1:].tolist())
     labels = {landmark.landmark: landmark.label for landmark in found.landmarks}
     return TiedMap(
         sessions=tuple(T_first),
         axes=("xyz"[plane[0]], "xyz"[plane[1]]),
-        trajectories=tuple((session, way[:, plane]) for session, way in ways.items()),
+        trajectories=tuple((session, path[:, plane]) for session, path in paths.items()),
         places=tuple(MapPlace(n, labels[n], xyz[plane], last[n][1]) for n, xyz in at.items()),
         ties=tuple(
             (

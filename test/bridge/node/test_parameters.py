@@ -104,7 +104,8 @@ def test_a_start_value_that_nobody_asked_for_is_warned_of(made: Made, capfd: pyt
     made("treshold:=0.4", "zoom:=2", "count:=4", "use_sim_time:=false", "qos_overrides./a.publisher.depth:=3")
     first, second = [line for line in capfd.readouterr().err.splitlines() if "WARN" in line]
     assert "parameter treshold is ignored: this node has none of that name; did you mean threshold?" in first
-    assert "parameter zoom is ignored" in second and "see `ros2 param list /pot`" in second
+    assert "parameter zoom is ignored" in second
+    assert "see `objreg params`" in second or "see `ros2 param list /pot`" in second
 
 
 def test_a_live_change_is_taken_and_told(made: Made) -> None:

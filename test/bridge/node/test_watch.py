@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import pytest
+
 from objreg_ros.bridge.node.watch import Watch
 
 
@@ -11,6 +13,11 @@ class Clock:
 
     def __call__(self) -> float:
         return self.now
+
+
+@pytest.fixture(autouse=True)
+def without_ros2cli(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.which", lambda name: None)
 
 
 def watched(publishers: dict[str, int]) -> tuple[Watch, Clock]:
@@ -34,13 +41,22 @@ def test_a_silent_input_without_a_publisher_is_told_how_to_be_remapped() -> None
     clock.now = 7.0
     advice = watch.silent()["depth"]
     assert advice.startswith("nothing on /kinect/points or /kinect/depth/image for 7 s: no publisher")
-    assert "ros2 topic list" in advice and "-r depth/image:=/your/topic" in advice
+    assert "no publisher; see what the driver publishes, then remap" in advice and "ros2" not in advice
+    assert "-r depth/image:=/your/topic" in advice
 
 
 def test_a_silent_input_with_a_publisher_is_told_to_look_at_its_qos() -> None:
     watch, clock = watched({"/kinect/points": 1})
     clock.now = 7.0
-    assert "ros2 topic info -v /kinect/points" in watch.silent()["depth"]
+    assert watch.silent()["depth"].endswith("another QoS: see docs/troubleshooting.md#waits-for-a-topic")
+
+
+def test_the_commands_of_ros2cli_are_named_where_they_are_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.which", lambda name: f"/opt/ros/jazzy/bin/{name}")
+    for publishers, command in [({}, "ros2 topic list"), ({"/kinect/points": 1}, "ros2 topic info -v /kinect/points")]:
+        watch, clock = watched(publishers)
+        clock.now = 7.0
+        assert command in watch.silent()["depth"]
 
 
 def test_an_input_that_is_not_watched_may_speak() -> None:

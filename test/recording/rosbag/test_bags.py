@@ -325,7 +325,7 @@ def test_times_that_no_clock_has_are_a_broken_bag(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", records())
     file, content = tmp_path / "bag/metadata.yaml", (tmp_path / "bag/metadata.yaml").read_text()
     file.write_text(content.replace("nanoseconds_since_epoch: 1000000000", f"nanoseconds_since_epoch: {10**30}"))
-    with pytest.raises(ValueError, match=r"expected a whole bag, got: records from 1000.*; make metadata"):
+    with pytest.raises(ValueError, match=r"expected a whole bag, got: records from 1000.*; move metadata"):
         open_recording(tmp_path / "bag")
 
 

@@ -17,8 +17,8 @@ def test_tied_sessions_are_in_the_frame_of_the_oldest_with_their_ties(tmp_path: 
     shown = [(1.0, 0, at(0.0)), (2.0, 1, at(0.0)), (3.0, 2, at(0.0))]
     (one,) = tied_maps(survey(store_of(tmp_path / "s.db", shown, [tying(1.0, 2.0, 0, 1, 0.5)])))
     assert one.sessions == (0, 1) and one.axes == ("x", "z")
-    (first, way), (second, moved_way) = one.trajectories
-    assert (first, second) == (0, 1) and moved_way[0] - way[0] == pytest.approx(np.array([0.5, 0.0]))
+    (first, path), (second, moved_path) = one.trajectories
+    assert (first, second) == (0, 1) and moved_path[0] - path[0] == pytest.approx(np.array([0.5, 0.0]))
     ((earlier, later, here, there),) = one.ties
     assert (earlier, later) == (0, 1) and there - here == pytest.approx(np.array([0.5, 0.0]))
 
