@@ -52,7 +52,7 @@ class Registrar:
         self._method, self._gate = method or method_of(params), gate
         self._confirm_seconds = params.confirm_seconds if gate is None else 0.0
         self._lock = threading.RLock()
-        with progress(f"opening the store {params.store}"):
+        with progress(f"opening the store {params.store}".rstrip()):
             self._store = Store(params.store)
         self._pools = Pools(params.threads)
         try:
