@@ -13,7 +13,7 @@ import pytest
 from distributed import LocalCluster
 
 from objreg_tools import workers
-from objreg_tools.workers import LIVES, Done, spread
+from objreg_tools.workers import LIVES, Done, report_progress, spread
 
 
 def halve(number: int) -> int:
@@ -30,6 +30,13 @@ def die(folder: Path, deaths: int, item: int) -> int:
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return item
+
+
+def count_to(number: int) -> int:
+    """The number, with a report at each step."""
+    for done in range(1, number + 1):
+        report_progress(done, number)
+    return number
 
 
 def test_no_item_needs_no_worker() -> None:
@@ -73,3 +80,13 @@ def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_a_result_is_the_value_of_the_work() -> None:
     assert Done("item", 3).result() == 3
+
+
+def test_the_end_of_each_item_is_among_its_reports_and_not_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[int, int, int]] = []
+    values = [done.result() for done in spread(count_to, [50, 20], workers=2, on_progress=lambda *row: seen.append(row))]
+    assert sorted(values) == [20, 50] and {(0, 50, 50), (1, 20, 20)} <= set(seen) and len(seen) < 20
+
+
+def test_a_report_without_workers_is_none() -> None:
+    assert count_to(3) == 3
