@@ -44,7 +44,7 @@ def measure(
     """The figures of one run over all recordings; ``receive`` is told how many have ended."""
     settings = read_settings(None, ["registrar.threads=1", "detector.threads=1"])
     work = BatchWork.of(RecordedOptions(settings), folder, ("batch",))
-    start, ended = time.perf_counter(), list[Done[Path, None]]()
+    start, ended = time.perf_counter(), list[Done[Path, str]]()
     for done in spread(work, recordings, workers):
         done.result()
         ended.append(done)

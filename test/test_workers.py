@@ -82,10 +82,14 @@ def test_a_result_is_the_value_of_the_work() -> None:
     assert Done("item", 3).result() == 3
 
 
-def test_the_end_of_each_item_is_among_its_reports_and_not_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: list[tuple[int, int, int]] = []
-    values = [done.result() for done in spread(count_to, [50, 20], workers=2, on_progress=lambda *row: seen.append(row))]
-    assert sorted(values) == [20, 50] and {(0, 50, 50), (1, 20, 20)} <= set(seen) and len(seen) < 20
+def test_the_end_of_each_item_is_among_its_reports_and_not_each_step() -> None:
+    seen: list[tuple[int, ...]] = []
+    ended = spread(count_to, [50, 20], workers=2, on_progress=lambda *row: seen.append(row))
+    assert (
+        sorted(done.result() for done in ended) == [20, 50]
+        and {(0, 50, 50), (1, 20, 20)} <= set(seen)
+        and len(seen) < 20
+    )
 
 
 def test_a_report_without_workers_is_none() -> None:

@@ -14,6 +14,8 @@ from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 
 RESULT = {
+    "recording": "/tum",
+    "findings": [],
     **dict.fromkeys(("frames", "detections", "objects"), 0),
     "constraints": [],
     "refusals": [],
@@ -31,7 +33,7 @@ def test_a_result_holds_until_a_setting_or_the_recording_changes(tmp_path: Path)
     recording = tum_folder(tmp_path / "tum", frames=2)
     one = work(tmp_path)
     assert one.differing(recording) is None
-    made = {**RESULT, "batch": {"made": one._made_of(recording), "seconds": 1.0, "notes": []}}
+    made = {**RESULT, "batch": {"made": one.made_of(recording), "seconds": 1.0, "notes": []}}
     one.file(recording).write_text(json.dumps(made))
     assert one.differing(recording) == []
     assert work(tmp_path, "registrar.seed=7").differing(recording) == ["registrar.seed"]

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ class Row:
     rejected: Mapping[str, int] = field(default_factory=dict)
     seconds: float | None = None
     stage_p50_ms: Mapping[str, float] = field(default_factory=dict)
+    findings: Sequence[Mapping[str, str]] = ()  # as the JSON has them
+    page: str = ""  # of the recording, in the folder of the batch; empty where there is none
 
     @classmethod
     def of(cls, recording: Path, file: str, summary: Mapping[str, Any]) -> Row:
@@ -45,7 +47,12 @@ class Row:
             rejected=summary["rejected"],
             seconds=summary["batch"]["seconds"],
             stage_p50_ms={stage: ms["p50"] for stage, ms in summary["stage_ms"].items()},
+            findings=summary["findings"],
         )
+
+    def with_page(self, page: Path) -> Row:
+        """The row with its page, where that is there."""
+        return replace(self, page=page.name) if page.is_file() else self
 
     @classmethod
     def failed(cls, recording: Path, error: Exception) -> Row:

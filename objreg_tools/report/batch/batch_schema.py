@@ -114,6 +114,7 @@ CONSTRAINT = _fields(
 )
 REFUSAL = _fields(from_ns=STAMP, to_ns=STAMP, T_from_to=_optional(POSE), reason=_text, detail=_text, evidence=EVIDENCE)
 RESULT = _fields(
+    recording=_text,
     frames=COUNT,
     detections=COUNT,
     objects=COUNT,
@@ -121,6 +122,7 @@ RESULT = _fields(
     refusals=_list(REFUSAL),
     rejected=_by_name(COUNT),
     stage_ms=_by_name(_fields(p50=_number)),
+    findings=_list(_fields(what=_text, cause=_text, todo=_text, anchor=_text)),
     truth=_fields(count=COUNT, strict=COUNT, loose=COUNT, false=COUNT),
     batch=_fields(made=_by_name(_anything), seconds=_duration, notes=_list(_text)),
 )

@@ -52,7 +52,8 @@ class Tables:
 
     def add_recording(self, row: Row, summary: Mapping[str, Any] | None) -> None:
         """A recording with its JSON; None where it failed."""
-        self._sheets["recordings"].add_row(_items(asdict(row), "rejected", "stage_p50_ms"))
+        whats = [finding["what"] for finding in row.findings]
+        self._sheets["recordings"].add_row({**_items(asdict(row), "rejected", "stage_p50_ms"), "findings": whats})
         for item in () if summary is None else summary["constraints"]:
             self._sheets["constraints"].add_row({"recording": row.recording, **_constraint(item)})
         for item in () if summary is None else summary["refusals"]:
@@ -114,11 +115,12 @@ def _schemas(arrow: ModuleType) -> dict[str, Any]:
     ends = {"recording": text, "from_ns": whole, "to_ns": whole, "T_from_to": arrow.list_(number)}
     counts = ("frames", "detections", "objects", "constraints", "strict", "loose", "false")
     recordings = {
-        **dict.fromkeys(("name", "recording", "file", "error"), text),
+        **dict.fromkeys(("name", "recording", "file", "page", "error"), text),
         **dict.fromkeys(counts, whole),
         "rejected": arrow.map_(text, whole),
         "seconds": number,
         "stage_p50_ms": numbers,
+        "findings": arrow.list_(text),
     }
     errors = {"error_rotation_deg": number, "error_translation_cm": number, "false": arrow.bool_()}
     constraints = {"covariance": arrow.list_(number), "labels": arrow.list_(text), "evidence": numbers, **errors}

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from string import ascii_uppercase
-from typing import Any
+from typing import Any, Protocol
 
-from objreg_ros.data.closures import LoopClosure, Rejected
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_tools.report.run.pairs import PairRow, pairs_of
 from objreg_tools.report.run.run_summary import RunSummary
@@ -16,6 +16,16 @@ from objreg_tools.report.run.trajectory_error import root_mean_square
 
 DEFAULT = "default"
 KEYFRAME_NS = round(RegistrarParams().keyframe_seconds * 1e9)  # stamps so near are of one keyframe
+
+
+class Ends(Protocol):
+    """What lies between two stamps."""
+
+    @property
+    def from_ns(self) -> int: ...
+
+    @property
+    def to_ns(self) -> int: ...
 
 
 def comparison(all_runs: Sequence[RunSummary]) -> View:
@@ -110,7 +120,7 @@ def _change(all_runs: Sequence[RunSummary], k: int, names: Sequence[str]) -> Vie
     }
 
 
-def matched(before: Sequence[LoopClosure], after: Sequence[LoopClosure]) -> dict[int, int]:
+def matched(before: Sequence[Ends], after: Sequence[Ends]) -> dict[int, int]:
     """Which closure of one run is which of another: both stamps within `KEYFRAME_NS`, the nearest first."""
     near = sorted(
         (apart, i, j)
@@ -127,7 +137,7 @@ def matched(before: Sequence[LoopClosure], after: Sequence[LoopClosure]) -> dict
     return found
 
 
-def _apart_ns(one: LoopClosure, other: LoopClosure | Rejected) -> int:
+def _apart_ns(one: Ends, other: Ends) -> int:
     return max(abs(one.from_ns - other.from_ns), abs(one.to_ns - other.to_ns))
 
 

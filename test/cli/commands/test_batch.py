@@ -33,7 +33,7 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """The work is done in this process; what of it was asked for."""
     asked: list[Path] = []
 
-    def here(work: Any, items: list[Path], workers: int | None, scheduler: str) -> Any:
+    def here(work: Any, items: list[Path], workers: int | None, scheduler: str, on_progress: Any = None) -> Any:
         for item in items:
             asked.append(item)
             try:
@@ -74,6 +74,55 @@ def test_what_is_done_is_not_done_again_unless_something_changed(
     changed = batch(first, *words[2:], *out, "--set", "registrar.seed=7", "--max-frames", 1)
     assert "! 1 were made otherwise and are done anew: max_frames, registrar.seed changed" in changed.output
     assert len(alone) == 3 and "1 recordings, 0 failed, 1 frames" in changed.output
+
+
+def test_each_recording_has_its_page_and_one_that_is_gone_is_drawn_without_a_run(
+    words: list[object], tmp_path: Path, alone: list[Path]
+) -> None:
+    out = tmp_path / "out"
+    batch(*words, "--out", out, "--no-pages")
+    assert [*out.glob("?-*.html")] == [] and len(alone) == 2
+    results = {file: file.stat().st_mtime_ns for file in out.glob("*.json")}
+    again = batch(*words, "--out", out)
+    assert len([*out.glob("?-*.html")]) == 2 and "2 of 2 recordings are done already" in again.output
+    assert {file: file.stat().st_mtime_ns for file in out.glob("*.json")} == results
+    batch(*words, "--out", out)
+    assert len(alone) == 4, "what has both is not asked for"
+    page = (out / "report.html").read_text()
+    assert all(f'href="{file.with_suffix(".html").name}"' in page for file in results)
+
+
+def test_a_page_that_cannot_be_drawn_costs_no_result(
+    words: list[object], tmp_path: Path, alone: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("no ink")
+
+    monkeypatch.setattr("objreg_tools.cli.batch_work.write_report", fail)
+    result = batch(*words, "--out", tmp_path / "out")
+    assert result.return_value == 0 and "! a: no page: no ink" in result.output
+
+
+def test_findings_are_in_the_terminal_on_the_page_and_in_the_table(
+    words: list[object], tmp_path: Path, alone: list[Path]
+) -> None:
+    result = batch(*words, "--out", tmp_path / "out")
+    (first, *_) = pyarrow.parquet.read_table(tmp_path / "out/recordings.parquet").to_pylist()[0]["findings"]
+    assert f"  ! {first}" in result.output and "<h2>Findings</h2>" in (tmp_path / "out/report.html").read_text()
+
+
+def test_two_batches_are_compared_and_another_folder_is_only_read(
+    words: list[object], tmp_path: Path, alone: list[Path]
+) -> None:
+    before = tmp_path / "before"
+    batch(*words, "--out", before)
+    files = {file: file.read_bytes() for file in before.iterdir()}
+    again = ("--out", tmp_path / "now", "--against", before)
+    assert f"against {before}: 0 of 2 recordings changed" in batch(*words, *again).output
+    fewer = batch(*words, *again, "--max-frames", 2)
+    assert "max_frames: None → 2" in fewer.output and "1 of 2 recordings changed" in fewer.output
+    assert "next: objreg report" in fewer.output and "Against " in (tmp_path / "now/report.html").read_text()
+    assert files == {file: file.read_bytes() for file in before.iterdir()}
 
 
 def test_half_a_result_is_none(words: list[object], tmp_path: Path, alone: list[Path]) -> None:

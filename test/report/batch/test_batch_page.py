@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
+from objreg_tools.report.batch.batch_comparison import Change
 from objreg_tools.report.batch.batch_page import batch_page, totals
 from objreg_tools.report.batch.batch_rows import Row
 
@@ -20,3 +23,19 @@ def test_a_page_has_every_recording_every_reason_and_every_failure() -> None:
     assert 'href="a.json"' in page and "no such &lt;file&gt;" in page and "version 1.2.3" in page
     assert '<td>slack</td><td class="number">7</td>' in page
     assert '<td>detect</td><td class="number">3.0</td><td class="number">4.0</td>' in page
+
+
+def test_a_finding_is_there_once_with_all_that_have_it_and_links_lead_to_pages() -> None:
+    dark = {"what": "dark: 3 lux", "cause": "it was night", "todo": "put on a lamp", "anchor": "dark"}
+    rows = [replace(GOOD, findings=[dark], page="a.html"), replace(BLIND, findings=[{**dark, "what": "dark: 4 lux"}])]
+    page = batch_page(rows, {})
+    assert page.count('<p class="what">') == 1 and "In 2 of 2: " in page and "with other numbers" in page
+    assert page.count('href="a.html"') == 2 and page.count('href="b.json"') == 3
+
+
+def test_changes_are_before_all_else_and_changed_rows_first() -> None:
+    same, more = Change(BLIND, BLIND, kept=2), Change(GOOD, replace(GOOD, constraints=1), 1, 3, 0, {"x": (1, 2)})
+    page = batch_page([BLIND, GOOD], {}, "/before", [same, more, Change(GONE, None)])
+    part = page[page.index("Against /before") : page.index("<h2>Recordings")]
+    assert "1 of 3 recordings changed" in part and "<strong>1 → 4</strong>" in part and "1 → 2" in part
+    assert part.index(">a</a>") < part.index("&lt;c&gt;") < part.index(">b</a>") and "failed now" in part

@@ -12,6 +12,7 @@ SUMMARY = {
     "objects": 3,
     "constraints": [{}] * 6,
     "rejected": {"slack": 2},
+    "findings": [],
     "truth": TRUTH,
     "stage_ms": {"detect": {"p50": 1.5, "p95": 2.0}},
     "batch": {"seconds": 7.0},

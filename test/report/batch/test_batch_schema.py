@@ -18,6 +18,8 @@ from objreg_tools.report.batch.batch_tables import batch_tables
 
 ENDS = {"from_ns": 2, "to_ns": 1, "T_from_to": np.eye(4).tolist(), "evidence": {"score": 0.5, "rmse": float("nan")}}
 RESULT: dict[str, Any] = {
+    "recording": "/bag",
+    "findings": [{"what": "dark", "cause": "night", "todo": "a lamp", "anchor": "dark"}],
     "frames": 2,
     "detections": 3,
     "objects": 4,

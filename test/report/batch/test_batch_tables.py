@@ -27,14 +27,14 @@ def test_constraints_and_refusals_of_all_recordings_are_rows_with_units(tmp_path
     errors = [{"rotation_deg": 1.0, "translation_cm": 2.0}, {"rotation_deg": 9.0, "translation_cm": 2.0}, None]
     refusals = [{**ENDS, "T_from_to": None, "reason": "slack", "detail": "x"}]
     with batch_tables(tmp_path) as tables:
-        tables.add_recording(
-            Row("a", "/a", frames=2), {"constraints": list(map(constraint, errors)), "refusals": refusals}
-        )
+        dark = Row("a", "/a", frames=2, findings=[{"what": "dark", "cause": "night"}])
+        tables.add_recording(dark, {"constraints": list(map(constraint, errors)), "refusals": refusals})
         tables.add_recording(Row("b", "/b", error="gone"), None)
     assert [(row["name"], row["frames"], row["error"]) for row in rows_of(tmp_path, "recordings")] == [
         ("a", 2, ""),
         ("b", 0, "gone"),
     ]
+    assert [row["findings"] for row in rows_of(tmp_path, "recordings")] == [["dark"], []]
     found = rows_of(tmp_path, "constraints")
     assert [row["false"] for row in found] == [False, True, None] and found[1]["error_rotation_deg"] == 9.0
     assert np.reshape(found[0]["T_from_to"], (4, 4)).tolist() == POSE and found[0]["evidence"] == [("odds", 3.0)]
