@@ -116,7 +116,8 @@ def spread(
 def _done(item: Item, future: Any) -> Done[Item, Any]:
     distributed = require_dask()
     try:
-        return future.result()
+        ended = future.result()
+        return Done(item, ended.value, ended.error)  # the item itself, not the copy that has travelled
     except distributed.KilledWorker:
         return Done(item, error=OSError(f"{LIVES} workers died at it; it may need more memory than there is"))
     except Exception as error:  # whatever kept Dask from bringing the result

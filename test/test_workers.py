@@ -92,5 +92,11 @@ def test_the_end_of_each_item_is_among_its_reports_and_not_each_step() -> None:
     )
 
 
+def test_an_ended_item_is_the_one_that_was_given_and_no_copy(tmp_path: Path) -> None:
+    item = tmp_path / "a"
+    (done,) = spread(os.path.basename, [item], workers=1)
+    assert done.item is item and done.value == "a"
+
+
 def test_a_report_without_workers_is_none() -> None:
     assert count_to(3) == 3

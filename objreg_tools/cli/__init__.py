@@ -34,6 +34,7 @@ SUMMARIES = {
     "offline": "Run a recording through the three stages, without ROS.",
     "pair": "Register two frames of a recording, and show what each step saw.",
     "batch": "Run many recordings, over the cores of this machine or a cluster.",
+    "sweep": "Run recordings with every combination of parameter values, and compare.",
     "replay": "Publish a recording into the live graph.",
     "watch": "Show a running graph on a page of this machine.",
     "convert": "Write any recording as rosbag2.",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables that are sorted by a column and searched by words: section.table, th[data-sort], td[data-value].
+// Tables that are sorted by a column and searched by text: section.table, th[data-sort], td[data-value].
 "use strict";
 
 function browseTable(section) {
@@ -8,16 +8,16 @@ function browseTable(section) {
   const count = section.querySelector(".count");
 
   function filter() {
-    const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const parts = search.value.toLowerCase().split(/\s+/).filter(Boolean);
     for (const row of rows) {
       const text = (row.textContent + " " + (row.dataset.search || "")).toLowerCase();
-      row.hidden = !words.every((word) => text.includes(word));
+      row.hidden = !parts.every((part) => text.includes(part));
     }
     const shown = rows.filter((row) => !row.hidden).length;
     count.textContent = shown + " of " + rows.length;
   }
 
-  // Rows without the value come last in both orders; numbers go down first, words up.
+  // Rows without the value come last in both orders; numbers go down first, texts up.
   function sort(head) {
     const numeric = head.dataset.sort === "number", first = numeric ? "descending" : "ascending";
     const order = head.getAttribute("aria-sort") !== first ? first : numeric ? "ascending" : "descending";
