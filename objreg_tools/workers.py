@@ -162,7 +162,7 @@ def _own(distributed: ModuleType, workers: int) -> Any:
         threads_per_worker=1,
         processes=True,
         memory_limit=0,  # a long run is not stopped for what it may need
-        dashboard_address=None,
+        dashboard_address="127.0.0.1:0",  # None would take port 8787, and warn where that is in use
         silence_logs=logging.CRITICAL,
         env=ONE_THREAD,
     )

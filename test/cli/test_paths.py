@@ -124,6 +124,7 @@ def test_a_store_a_model_and_a_run_are_not_written_over(kept: Path, tmp_path: Pa
         ("offline", tmp_path / "bag", "--g2o", share.model(share.AUTO)),
         ("report", kept, "--out", kept),
         ("batch", tmp_path, "--out", tmp_path),
+        ("sweep", tmp_path, "--out", tmp_path),
     ):
         with pytest.raises(ValueError, match="expected a place apart"):
             run(*words)
@@ -152,6 +153,8 @@ def test_nothing_is_written_into_the_folder_of_a_recording(tmp_path: Path) -> No
         ("convert", folder, folder / "bag"),
         ("offline", bag / "bag_0.mcap", "--mcap", bag / "bag_1.mcap"),
         ("batch", folder, "--out", folder / "deep" / "out"),
+        ("batch", bag, "--out", folder, "--against", folder),
+        ("sweep", folder, "--out", folder / "deep" / "out"),
     ):
         with pytest.raises(ValueError, match="expected a place apart"):
             run(*words)
@@ -184,7 +187,7 @@ def test_a_file_that_can_be_written_is_not_touched(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "option"), [("demo", "out"), ("simulate", "out"), ("convert", "out"), ("batch", "out")]
+    ("name", "option"), [("demo", "out"), ("simulate", "out"), ("convert", "out"), ("batch", "out"), ("sweep", "out")]
 )
 def test_a_folder_is_made_with_those_above_it(name: str, option: str, tmp_path: Path) -> None:
     require_apart(commands()[name], {option: tmp_path / "none/yet/here"})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Five users walk through what there is, each by what the last command told, and none comes to a dead end."""
+"""Six users walk through what there is, each by what the last command told, and none comes to a dead end."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from report.chromium import chromium
 
-from . import odd_bags, reader, researcher, student, trying
+from . import many, odd_bags, reader, researcher, student, trying
 from .walk import ROOM, Said, Walk
 
 pytestmark = pytest.mark.ros
@@ -82,6 +82,10 @@ def test_who_tries_a_recording_has_a_page_and_goes_on_to_a_pair(room: Path, tmp_
 
 def test_a_researcher_compares_two_runs_and_reads_what_they_wrote(study: Path) -> None:
     assert (study / "both.html").is_file()
+
+
+def test_a_researcher_goes_from_many_recordings_to_the_best_parameters(room: Path, tmp_path: Path) -> None:
+    many.walk(tmp_path, room)
 
 
 def test_an_engineer_hears_constraints_refusals_and_diagnostics_of_a_robot(

@@ -12,7 +12,8 @@ from objreg_tools.report.drawing import Plot
 from objreg_tools.report.run.figures import SERIES, WIDE
 from objreg_tools.report.sweep.sweep_rows import Setting, front_of, shown
 
-HEIGHT = 320
+HEIGHT = 320  # px
+LEAST_FALSE = 5  # false constraints that the axis shows at least, so that its ticks are whole numbers
 REST = "faint"
 
 
@@ -26,8 +27,8 @@ def recall_against_false(order: Sequence[Setting], width: int = WIDE) -> str:
     judged = [one for one in order if one.recall is not None]
     if not judged:
         return ""
-    most = max(one.total("false") for one in judged)
-    plot = Plot((-0.05 * max(most, 1), 1.1 * max(most, 1)), (0.0, 105.0), width, HEIGHT)
+    most = max(LEAST_FALSE, *(one.total("false") for one in judged))
+    plot = Plot((-0.05 * most, 1.1 * most), (0.0, 105.0), width, HEIGHT)
     plot.x_axis("false constraints")
     plot.y_axis("revisits closed, %")
     plot.line(
@@ -49,7 +50,7 @@ def constraints_against_odds(order: Sequence[Setting], width: int = WIDE) -> str
     high = max(float(log.max()) for log in logs.values())
     most = max(len(one.odds) for one in known)
     plot = Plot((np.floor(low), max(np.ceil(high), np.floor(low) + 1)), (0.0, 1.05 * most), width, HEIGHT)
-    plot.x_axis("odds of at least 10^")
+    plot.x_axis("least odds, as a power of 10")
     plot.y_axis("constraints")
     styles = styles_of(order)
     for one in reversed(known):

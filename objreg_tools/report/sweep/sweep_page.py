@@ -60,7 +60,7 @@ def verdict(settings: Sequence[Setting]) -> list[str]:
     recall = f"{best.total('closed')} of {best.total('revisits')} revisits closed"
     sentences = [f"Best: {best.text}: {recall}, {false} of {judged} constraints false."]
     if (equals := equals_of(settings, best)) > 1:
-        sentences.append(f"{equals} combinations are as good; of these it is the nearest to the defaults.")
+        sentences.append(f"{equals} combinations are equally good; this is the nearest of them to the defaults.")
     bound = most_false(false, judged)
     if bound is not None:
         sentences.append(f"So few constraints do not show a share of false ones below {100 * bound:.1f} % (95 %).")

@@ -49,7 +49,7 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
 
 def sweep(*words: object) -> Result:
-    return CliRunner().invoke(command, [str(word) for word in words], catch_exceptions=False, standalone_mode=False)
+    return CliRunner().invoke(command, [*map(str, words)], catch_exceptions=False, standalone_mode=False)
 
 
 def test_every_combination_of_all_recordings_is_run_and_written(

@@ -19,7 +19,7 @@ def test_the_best_is_there_to_copy_and_first_in_the_table() -> None:
 def test_the_verdict_says_how_far_it_can_be_trusted() -> None:
     text = " ".join(verdict([LOW, USUAL, SAME]))
     assert "Best: least_odds 75: 7 of 10 revisits closed, 0 of 9 constraints false." in text
-    assert "2 combinations are as good" in text and "below 28.3 %" in text and "Only one recording" in text
+    assert "2 combinations are equally good" in text and "below 28.3 %" in text and "Only one recording" in text
     two = replace(USUAL, found=(*USUAL.found, *USUAL.found))
     assert "Only one recording" not in " ".join(verdict([two]))
 
