@@ -14,12 +14,12 @@ from objreg_tools.report.sweep.sweep_rows import Setting, front_of, shown
 
 HEIGHT = 320  # px
 LEAST_FALSE = 5  # false constraints that the axis shows at least, so that its ticks are whole numbers
-REST = "faint"
+COLOURS, REST = SERIES - 1, "faint"  # the last colour of labels is grey, as the rest
 
 
 def styles_of(order: Sequence[Setting]) -> dict[int, str]:
-    """The CSS class of each combination by its identity: a colour for the first `SERIES`, faint for the rest."""
-    return {id(one): f"series-{k}" if k < SERIES else REST for k, one in enumerate(order)}
+    """The CSS class of each combination by its identity: a colour for the first `COLOURS`, faint for the rest."""
+    return {id(one): f"series-{k}" if k < COLOURS else REST for k, one in enumerate(order)}
 
 
 def recall_against_false(order: Sequence[Setting], width: int = WIDE) -> str:

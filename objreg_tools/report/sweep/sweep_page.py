@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from objreg_tools.report.page import environment
-from objreg_tools.report.run.figures import NARROW, SERIES, WIDE
+from objreg_tools.report.run.figures import NARROW, WIDE
 from objreg_tools.report.sweep.sweep_figures import (
+    COLOURS,
     against_parameters,
     constraints_against_odds,
     recall_against_false,
@@ -43,9 +44,9 @@ def sweep_page(settings: Sequence[Setting], about: Mapping[str, Any]) -> str:
             {"name": wide["name"], "wide": wide["svg"], "narrow": narrow["svg"]}
             for wide, narrow in zip(by_width[WIDE], by_width[NARROW], strict=True)
         ],
-        legend=[(styles[id(one)], one.text) for one in order[:SERIES]],
+        legend=[(styles[id(one)], one.text) for one in order[:COLOURS]],
         failures=_failures(settings),
-        more=max(0, len(order) - SERIES),
+        more=max(0, len(order) - COLOURS),
     )  # fmt: skip
 
 

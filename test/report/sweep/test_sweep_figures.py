@@ -4,8 +4,8 @@ from __future__ import annotations
 import re
 
 from objreg_tools.report.page import TEMPLATES
-from objreg_tools.report.run.figures import SERIES
 from objreg_tools.report.sweep.sweep_figures import (
+    COLOURS,
     against_parameters,
     constraints_against_odds,
     recall_against_false,
@@ -43,7 +43,7 @@ def test_a_sweep_that_found_nothing_is_drawn_too() -> None:
 
 
 def test_those_beyond_the_colours_are_faint_and_every_style_has_its_rule() -> None:
-    many = [setting(float(k)) for k in range(SERIES + 2)]
+    many = [setting(float(k)) for k in range(COLOURS + 2)]
     styles, css = set(styles_of(many).values()), (TEMPLATES / "style.css").read_text()
-    assert styles == {*(f"series-{k}" for k in range(SERIES)), "faint"}
+    assert styles == {*(f"series-{k}" for k in range(COLOURS)), "faint"}
     assert all(f".line.{style} {{" in css for style in styles) and ".dot.faint {" in css
