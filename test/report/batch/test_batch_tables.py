@@ -51,3 +51,14 @@ def test_without_pyarrow_the_extra_is_named(monkeypatch: pytest.MonkeyPatch, tmp
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(ValueError, match=r"pip install 'objreg_ros\[batch\]'"), batch_tables(tmp_path):
         pass
+
+
+@pytest.mark.parametrize("name", ["recordings", "constraints", "refusals"])
+def test_the_tutorial_names_every_column(name: str, tmp_path: Path, repository: Path) -> None:
+    with batch_tables(tmp_path):
+        pass
+    text = (repository / "docs/tutorials/many-recordings.md").read_text(encoding="utf-8")
+    (line,) = (line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
+    columns = pyarrow.parquet.read_schema(tmp_path / f"{name}.parquet").names
+    lacking = [column for column in columns if f"`{column}`" not in line]
+    assert not lacking

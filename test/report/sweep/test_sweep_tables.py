@@ -39,3 +39,11 @@ def test_the_table_has_a_row_for_each_combination_and_recording_with_its_values(
         (0, "gone", 0), (0, "", 1), (1, "gone", 0), (1, "", 1),
     ]  # fmt: skip
     assert rows[0][ODDS] == 5.0 and rows[0]["registrar.label_groups"] == ["a b"] and rows[0]["odds"] == [300.0, 90.0]
+
+
+def test_the_tutorial_names_every_column(tmp_path: Path, repository: Path) -> None:
+    write_parquet(tmp_path / "s.parquet", [LOW])
+    text = (repository / "docs/tutorials/many-recordings.md").read_text(encoding="utf-8")
+    (line,) = (line for line in text.splitlines() if line.startswith("| `sweep` |"))
+    lacking = [name for name in pyarrow.parquet.read_schema(tmp_path / "s.parquet").names if f"`{name}`" not in line]
+    assert not lacking
