@@ -42,7 +42,12 @@ class KeepsFrames:
     """In place of the registrar: keeps the frames."""
 
     frames: list[Frame] = field(default_factory=list)
-    tracked = None
+    tracked = relocalised = None  # it follows no camera
+    whereabouts = ""
+
+    def counts(self) -> dict[str, int]:
+        """Nothing is stored."""
+        return {}
 
     def process(self, frame: Frame) -> Outcome:
         """Keep a frame."""
