@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes: ``ros2 launch objreg_ros objreg.launch.py image:=/kinect/rgb points:=/kinect/points``.
 
-Every argument is optional; ``mapper:=true`` starts the reference mapper beside the other three nodes,
-``composed:=true`` all of them in one process. Where another detector says what is where, ours is not started. No
+Every argument is optional; ``mapper:=true`` starts the reference mapper beside the other three nodes. All of them are
+one process, or with ``composed:=false`` each is one. Where another detector says what is where, ours is not started. No
 parameter's default is repeated here; what is not said is as in the code. In a namespace, /tf and /tf_static are
 those of the namespace.
 """
@@ -73,8 +73,8 @@ OPTIONS = {
     "exchange": "namespace of the topics by which registrars of several robots exchange keyframes, as /fleet",
     "key_file": "file with the key that the robots share, by which keyframes of registrar and keyframer are signed",
     "mapper": "true to start the reference mapper too, which publishes path and correction",
-    "composed": "true for all nodes in one process, which takes half of the memory",
-    "managed": "true for nodes with a life cycle (~/change_state); not with composed",
+    "composed": "false for a process for each node, with 1.7 times the memory; so it is with managed or enclaves",
+    "managed": "true for nodes with a life cycle (~/change_state), each a process",
     "autostart": "false to leave managed nodes unconfigured until somebody asks for more",
     "respawn": "true to start a process again that has ended with an error or was killed",
     "enclaves": "path of the nodes' enclaves under SROS 2, as /objreg: each node runs in <path>/<its name>",
@@ -122,11 +122,13 @@ def _nodes(context: LaunchContext) -> list[Node]:
         "respawn_delay": RESPAWN_S,
         "on_exit": None if _is_true(said["respawn"]) else _ended,
     }
-    if _is_true(said["composed"]):
-        nodes = [_together(names, said, alike)]
-    else:
-        nodes = [_alone(node, said, alike) for node in names]
+    nodes = [_together(names, said, alike)] if _is_composed(said) else [_alone(node, said, alike) for node in names]
     return [*nodes, *_rviz(said, alike)]
+
+
+def _is_composed(said: dict[str, str]) -> bool:
+    """All in one process, unless nodes are to be apart, or each is to have a life cycle or an enclave of its own."""
+    return _is_true(said["composed"]) if said["composed"] else not (_is_true(said["managed"]) or said["enclaves"])
 
 
 def _alone(node: str, said: dict[str, str], alike: dict) -> Node:

@@ -58,13 +58,13 @@ def replayed(repository: Path, said: dict[str, Any]) -> Callable[..., list[str]]
 
 def test_without_arguments_no_parameter_is_set_and_nothing_is_remapped(repository: Path, said: dict[str, Any]) -> None:
     file = launch_file(repository)
-    assert file["_remappings"](said) == [] and all(file["_parameters"](room, said) == [] for room in file["STAGES"])
+    assert file["_remappings"](said) == [] and all(file["_parameters"](node, said) == [] for node in file["NODES"])
 
 
 def test_the_mapper_comes_along_when_it_is_asked_for(repository: Path, said: dict[str, Any]) -> None:
-    rooms = launch_file(repository)["_rooms"]
-    assert rooms(said) == ("detector", "segmenter", "registrar")
-    assert rooms({**said, "mapper": "True"}) == ("detector", "segmenter", "registrar", "mapper")
+    names = launch_file(repository)["_names_of_nodes"]
+    assert names(said) == ("detector", "segmenter", "registrar")
+    assert names({**said, "mapper": "True"}) == ("detector", "segmenter", "registrar", "mapper")
 
 
 @pytest.mark.parametrize(("detections", "first"), [("table", "detector"), ("masks", "segmenter")])
@@ -73,7 +73,7 @@ def test_our_detector_stays_at_home_where_another_one_speaks(
 ) -> None:
     file = launch_file(repository)
     given = {**said, "detections": detections, "camera": "500,500,320,240", "T_base_camera": "0,0,1,0,0,0,1"}
-    assert file["_rooms"](given)[0] == first
+    assert file["_names_of_nodes"](given)[0] == first
     place = {"T_base_camera": [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}
     assert file["_parameters"]("segmenter", given) == [{"detections": detections, "camera": "500,500,320,240", **place}]
     assert file["_parameters"]("registrar", given) == [place] and file["_parameters"]("detector", given) == []
@@ -82,13 +82,13 @@ def test_our_detector_stays_at_home_where_another_one_speaks(
 def test_the_nodes_of_one_process_each_get_their_own_parameters(repository: Path, said: dict[str, Any]) -> None:
     file = launch_file(repository)
     given = {**said, "model": "my.onnx", "source": "points", "params_file": "my.yaml"}
-    users, ours = file["_shared"](file["STAGES"], given)
+    users, ours = file["_shared"](file["NODES"], given)
     told = json.loads(Path(ours).read_text())
     assert users == "my.yaml" and told == {
         "/**/detector": {"ros__parameters": {"model": "my.onnx"}},
         "/**/segmenter": {"ros__parameters": {"source": "points"}},
     }
-    assert file["_shared"](file["STAGES"], said) == []
+    assert file["_shared"](file["NODES"], said) == []
 
 
 def test_rviz_gets_the_namespace_and_the_topics_of_the_nodes(repository: Path, said: dict[str, Any]) -> None:
@@ -139,6 +139,17 @@ def test_what_is_said_goes_over_the_users_file_to_the_node_that_it_is_for(
     assert parameters("registrar", given) == ["my.yaml", {"reliable": True}]
 
 
+@pytest.mark.parametrize(
+    ("given", "composed"),
+    [({}, True), ({"composed": "false"}, False), ({"managed": "true"}, False), ({"enclaves": "/objreg"}, False),
+     ({"composed": "true", "enclaves": "/objreg"}, True)],
+)  # fmt: skip
+def test_all_nodes_are_one_process_where_none_is_to_be_alone(
+    given: dict[str, str], composed: bool, repository: Path, said: dict[str, Any]
+) -> None:
+    assert launch_file(repository)["_is_composed"]({**said, **given}) == composed
+
+
 def test_managed_nodes_are_ones_that_launch_knows_the_state_of(repository: Path, said: dict[str, Any]) -> None:
     file = launch_file(repository)
     context = LaunchContext()
@@ -177,7 +188,7 @@ def test_every_node_has_the_transforms_of_its_namespace(
 ) -> None:
     file = launch_file(repository)
     context = LaunchContext()
-    context.launch_configurations.update({**said, "mapper": "true", "odom": "/wheels"})
+    context.launch_configurations.update({**said, "mapper": "true", "odom": "/wheels", "composed": "false"})
     made: list[dict[str, Any]] = []
     monkeypatch.setitem(file["_nodes"].__globals__, "Node", lambda **options: made.append(options))
     file["_nodes"](context)
@@ -221,7 +232,8 @@ def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
     command = [sys.executable, "-c", PROGRAM, str(repository / "launch" / "objreg.launch.py")]
     with (tmp_path / "log").open("w") as log:
         launched = subprocess.Popen(
-            [*command, "namespace:=robot", f"model:={tiny_model}", "use_sim_time:=false", "mapper:=true"],
+            [*command, "namespace:=robot", f"model:={tiny_model}", "use_sim_time:=false", "mapper:=true",
+             "composed:=false"],
             env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, stdout=log, stderr=log,
         )  # fmt: skip
     try:
@@ -237,7 +249,7 @@ def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
 def test_one_process_is_launched_in_a_namespace_with_the_parameters_of_each_node(
     graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path
 ) -> None:
-    command = [sys.executable, "-c", PROGRAM, str(repository / "launch" / "objreg.launch.py"), "composed:=true"]
+    command = [sys.executable, "-c", PROGRAM, str(repository / "launch" / "objreg.launch.py")]
     passing = tmp_path / "passing"
     passing.mkdir()
     with (tmp_path / "log").open("w") as log:
@@ -269,7 +281,7 @@ def test_a_replay_brings_every_frame_through_the_nodes_and_ends_the_launch(
         capture_output=True, text=True,
     )  # fmt: skip
     assert "registrar: 5 published" in launched.stdout, launched.stdout + launched.stderr
-    assert launched.stdout.count("process has finished cleanly") == 4
+    assert launched.stdout.count("process has finished cleanly") == 2
 
 
 def test_each_process_runs_in_an_enclave_of_its_own_where_they_are_asked_for(
@@ -294,13 +306,17 @@ def test_a_mount_that_is_no_seven_numbers_is_refused_by_its_name(repository: Pat
         launch_file(repository)["_numbers"]("T_base_camera", text)
 
 
-@pytest.mark.parametrize(("refused", "started"), [("model:=/nowhere.onnx", "detector"), ("T_base_camera:=1,2,x", "")])
+@pytest.mark.parametrize(
+    ("refused", "composed", "started"),
+    [("model:=/nowhere.onnx", "false", "detector"), ("model:=/nowhere.onnx", "", "objreg_graph"),
+     ("T_base_camera:=1,2,x", "", "")],
+)  # fmt: skip
 def test_a_launch_ends_where_something_is_refused_and_says_what(
-    graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path, refused: str, started: str
+    graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path, refused: str, composed: str, started: str
 ) -> None:
     file = str(repository / "launch" / "objreg.launch.py")
     launched = subprocess.run(
-        [sys.executable, "-c", PROGRAM, file, f"model:={tiny_model}", refused],
+        [sys.executable, "-c", PROGRAM, file, f"model:={tiny_model}", f"composed:={composed}", refused],
         env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, timeout=2 * START_S,
         capture_output=True, text=True,
     )  # fmt: skip
