@@ -117,6 +117,12 @@ def fit_camera(spans: Sequence[Span], camera: Intrinsics, near: CameraFit | None
     )
 
 
+def motions_as_stated(spans: Sequence[Span], camera: Intrinsics) -> Array:
+    """The motions ``T_last_first (n, 4, 4)`` of spans, at least one, of a ``camera`` that is what it says."""
+    corners, stated = _Corners.of(spans), np.array([camera.fx, camera.fy, camera.cx, camera.cy])
+    return _fit_motions(corners, stated, _rigid_motions(corners, stated), MOTIONS_FIRST)
+
+
 def _changed(camera: Array, change: Array) -> Array:
     return np.array([*(camera[:2] * np.exp(change[0])), *(camera[2:] + change[1:])])
 

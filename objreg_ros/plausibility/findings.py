@@ -84,12 +84,13 @@ def cameras_disagree(depth: Intrinsics, colour: Intrinsics) -> Finding:
     )
 
 
-def depth_scale(fit: HandEye) -> Finding:
-    """The camera moves by other metres than odometry."""
+def depth_scale(fit: HandEye, or_focal: bool = False) -> Finding:
+    """The camera moves by other metres than odometry; ``or_focal`` where its focal length is not known apart."""
     factor, sigma = fit.scale, fit.scale * fit.scale_sigma
+    focal = ", or the focal length of camera_info is" if or_focal else ""
     return Finding(
         f"the camera moves {factor:.2f} ± {sigma:.2f} times as far by its depth as by odometry",
-        f"depth is in steps of {1.0 / factor:.2g} of what its encoding says, or the metres of odometry are wrong",
+        f"depth is in steps of {1.0 / factor:.2g} of what it says, or the metres of odometry are wrong" + focal,
         "record depth in mm (16UC1) or in m (32FC1), or name the steps of a folder as depth_scale in camera.yaml; "
         "if depth is right, calibrate the wheels",
         "depth-scale",

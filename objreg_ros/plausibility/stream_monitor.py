@@ -19,13 +19,13 @@ from objreg_ros.data.frames import JUMP_NS, Odometry, View
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverses, rotation_angle
 from objreg_ros.plausibility import findings
-from objreg_ros.plausibility.camera_fit import MOST_MISFIT, CameraFit, fit_camera
+from objreg_ros.plausibility.camera_fit import MOST_MISFIT, CameraFit, fit_camera, motions_as_stated
 from objreg_ros.plausibility.corner_tracks import CornerTracks, Span
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.plausibility.hand_eye import HandEye, hand_eye
 from objreg_ros.plausibility.odometry_fit import ALIKE, LEAST_TURNS, find_shift, likeness
 from objreg_ros.plausibility.odometry_track import OdometryTrack
-from objreg_ros.plausibility.offset import Offset, offsets
+from objreg_ros.plausibility.offset import VAGUE_SIGMAS, Offset, offsets
 from objreg_ros.plausibility.pinhole import implausible
 
 # Deviations by which a number must be off: while looks are many; after `PATIENCE_S`; at the end, if never believed.
@@ -184,10 +184,11 @@ class StreamMonitor:
         """What is found of the odometry and its mount, and of the scale of depth."""
         fits = [k for k in range(len(self._legs)) if fit.misfit[k] < MOST_MISFIT]
         mounted = [k for k in fits if self._legs[k].mounts is not None]
-        chosen = mounted if len(mounted) >= LEAST_TURNS else fits
+        chosen = mounted if len(mounted) >= min(LEAST_TURNS, len(fits)) else fits
         if not chosen:
             return (), ()
-        legs, T_camera = [self._legs[k] for k in chosen], inverses(fit.T_last_first[chosen])
+        legs = [self._legs[k] for k in chosen]
+        T_camera = inverses(self._motions_as_stated(legs) if _is_vague(fit) else fit.T_last_first[chosen])
         T_odom, known = self._motions(legs, 0.0)
         alike = likeness(T_odom[known], T_camera[known])
         if chosen is mounted and alike.turns < LEAST_TURNS:
@@ -251,14 +252,20 @@ class StreamMonitor:
         finding = findings.mount_unknown(*self._frames, used, _left_open(self.mount))
         return (finding,), self._of_scale(fit, T_body)
 
+    def _motions_as_stated(self, legs: list[_Leg]) -> Array:
+        assert self.camera is not None
+        return motions_as_stated([leg.span for leg in legs], self.camera)
+
     def _of_scale(self, fit: HandEye, T_body: Array) -> tuple[Finding, ...]:
+        """Where little is known of the camera the motions are of the stated one: they prove no scale, but one that is
+        surely off is that of depth, or the camera's."""
         assert self.fit is not None
-        if any(offset.is_vague for offset in offsets(self.fit)):
-            return ()
-        self._scale = Offset(abs(float(np.log(fit.scale))), fit.scale_sigma)
+        vague, scale = _is_vague(self.fit), Offset(abs(float(np.log(fit.scale))), fit.scale_sigma)
+        self._scale = None if vague else scale
         metres = float(np.linalg.norm(T_body[:, :3, 3], axis=1).sum())
-        off = metres > LEAST_METRES and fit.rest < MOST_REST and self._scale.is_wrong(self._sigmas)
-        return (findings.depth_scale(fit),) if off else ()
+        sigmas = max(self._sigmas, VAGUE_SIGMAS) if vague else self._sigmas
+        off = metres > LEAST_METRES and fit.rest < MOST_REST and scale.is_wrong(sigmas)
+        return (findings.depth_scale(fit, or_focal=vague),) if off else ()
 
     def _of_gaps(self) -> tuple[Finding, ...]:
         share = self.with_odometry / self.frames
@@ -281,6 +288,11 @@ class StreamMonitor:
             ends.append(T_odom_body @ np.array([np.eye(4) if leg.mounts is None else leg.mounts[end] for leg in legs]))
             known &= there
         return inverses(ends[0]) @ ends[1], known
+
+
+def _is_vague(fit: CameraFit) -> bool:
+    """Whether little is known of a camera."""
+    return any(offset.is_vague for offset in offsets(fit))
 
 
 def _is_enough(mount: HandEye) -> bool:

@@ -13,6 +13,7 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import JUMP_NS, Odometry
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import pose, pose_error, rotation_from_vector
+from objreg_ros.plausibility.offset import offsets
 from objreg_ros.plausibility.stream_monitor import LONG_S, PATIENCE_S, StreamMonitor
 from plausibility.box_room import RATE_HZ, depth_and_grey, longer, odometry, seen_as, swinging
 from plausibility.moving import CAMERA, MOUNT
@@ -132,6 +133,29 @@ def test_depth_of_1_3_times_is_found_beside_odometry(pictures: Pictures, mount: 
     monitor.judge_rest()
     assert anchors(monitor)[0] == "depth-scale" and monitor.doubt == monitor.findings[0].what
     assert not monitor.proven and not monitor.disowned
+
+
+def sliding(seconds: Array) -> Array:
+    """Poses ``T_room_camera (n, 4, 4)`` of a camera that turns little: its focal length stays unknown."""
+    turns = 0.08 * np.sin(seconds[:, None] * [0.9, 1.1, 0.7])
+    places = np.sin(seconds[:, None] * [0.7, 0.5, 0.6]) * [0.7, 0.15, 0.1]
+    return pose(rotation_from_vector(turns), places)
+
+
+@pytest.fixture(scope="module")
+def slid() -> Pictures:
+    return [depth_and_grey(T) for T in sliding(SECONDS)]
+
+
+@pytest.mark.parametrize(("scale", "expected"), [(0.8, ["depth-scale"]), (1.0, []), (1.3, ["depth-scale"])])
+def test_where_the_focal_length_stays_unknown_a_wrong_scale_is_found_by_the_stated_one(
+    slid: Pictures, scale: float, expected: list[str]
+) -> None:
+    samples = odometry(ODOMETRY_SECONDS, sliding(ODOMETRY_SECONDS))
+    monitor = watch(slid, samples=samples, scale=scale)
+    assert monitor.fit is not None and any(offset.is_vague for offset in offsets(monitor.fit))
+    assert anchors(monitor) == expected and not monitor.proven
+    assert all("or the focal length" in finding.cause for finding in monitor.findings)
 
 
 def test_without_odometry_nothing_tells_the_scale_of_depth(pictures: Pictures) -> None:
