@@ -26,7 +26,7 @@ from objreg_mapper import saved
 from objreg_mapper.params import MapperParams
 from objreg_mapper.pose_graph import PoseGraph
 from objreg_ros.bridge.messages import from_msg, motion_from_msg
-from objreg_tools.cli.batch_work import BatchWork
+from objreg_tools.cli.many.batch_work import BatchWork
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 from objreg_tools.report.batch.batch_page import batch_page

@@ -25,8 +25,8 @@ from typing import Any
 import click
 import pyarrow.parquet
 
-from objreg_tools.cli.batch_work import BatchWork
 from objreg_tools.cli.commands.simulate import camera_of, sensors_of
+from objreg_tools.cli.many.batch_work import BatchWork
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 from objreg_tools.report.batch.batch_rows import Row

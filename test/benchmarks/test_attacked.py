@@ -154,7 +154,7 @@ def test_edited_results_are_refused_or_used(tmp_path: Path) -> None:
 
 def test_a_schema_that_lets_anything_in_is_seen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
-    from objreg_tools.cli import batch_work
+    from objreg_tools.cli.many import batch_work
 
     monkeypatch.setattr(batch_work, "require_result", lambda summary: None)
     assert first(script("attacked_results").result_attempt(tmp_path), "bug")

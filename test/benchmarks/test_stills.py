@@ -46,7 +46,7 @@ def test_depth_is_left_beside_colour_where_that_is_asked() -> None:
     from sources import Unturned
 
     image = SimpleNamespace()
-    assert Unturned().register(image) is image
+    assert Unturned().register(image, 1.0) is image
 
 
 def test_stills_of_a_kitchen_close_no_less_where_depth_is_brought_upon_colour(shared: Path) -> None:

@@ -40,13 +40,13 @@ def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
         Row(LONG, f"/r/{LONG}", "l.json", frames=70, constraints=100, false=1),
     ]
     changes = [Change(row, replace(row, constraints=1), 1, row.constraints - 1, 0) for row in rows]
-    return written(tmp_path_factory, batch_page(rows, {"version": "1"}, "/before", changes))
+    return written(tmp_path_factory, batch_page(rows, {"model": LONG}, "/before", changes))
 
 
 @pytest.fixture(scope="module")
 def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of three combinations."""
-    return written(tmp_path_factory, sweep_page([LOW, USUAL, HIGH], {"version": "1"}))
+    return written(tmp_path_factory, sweep_page([LOW, USUAL, HIGH], {"model": LONG}))
 
 
 def written(factory: pytest.TempPathFactory, text: str) -> Path:

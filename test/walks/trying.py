@@ -25,7 +25,7 @@ def a_simulated_recording(folder: Path, room: Path) -> None:
     """Nothing is wrong with it; the next command shows the steps of a closure."""
     someone = Walk(folder)
     tried = someone.type("try", str(room), "--no-open")
-    assert tried.output.startswith("assumed:") and "It worked: " in tried.text and ", none of " in tried.text
+    assert tried.output.startswith("assumed:") and "It worked: " in tried.text and "none of the " in tried.text
     text = _body(folder / f"{room.name}.html")
     assert text.startswith(room.name) and "What was assumed" in text and "All pairs" in text
     steps = someone.follow(tried, "--page", "pair.html")

@@ -14,7 +14,7 @@ import click
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import NOTHING, options
-from objreg_tools.cli.batch_work import BatchWork, read_result
+from objreg_tools.cli.many.batch_work import BatchWork, read_result
 from objreg_tools.cli.paths import InputPath, OutputPath, RecordingPath
 from objreg_tools.cli.progress import frame_bar
 from objreg_tools.cli.recorded import RecordedOptions

@@ -14,13 +14,13 @@ import click
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import NOTHING, options
-from objreg_tools.cli.batch_work import BatchWork
+from objreg_tools.cli.many.batch_work import BatchWork
+from objreg_tools.cli.many.sweep_grid import Combination, Grid, default_of
+from objreg_tools.cli.many.sweep_work import Failures, RevisitsFile, Share, shares, split, work
 from objreg_tools.cli.paths import OutputPath, RecordingPath
 from objreg_tools.cli.progress import frame_bar
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import print_ignored
-from objreg_tools.cli.sweep_grid import Combination, Grid, default_of
-from objreg_tools.cli.sweep_work import Failures, RevisitsFile, Share, shares, split, work
 from objreg_tools.cli.verbosity import aside
 from objreg_tools.report.batch.batch_tables import require_pyarrow
 from objreg_tools.report.run.revisits import Revisit

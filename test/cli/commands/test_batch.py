@@ -98,7 +98,7 @@ def test_a_page_that_cannot_be_drawn_costs_no_result(
     def fail(*_: object) -> None:
         raise RuntimeError("no ink")
 
-    monkeypatch.setattr("objreg_tools.cli.batch_work.write_report", fail)
+    monkeypatch.setattr("objreg_tools.cli.many.batch_work.write_report", fail)
     result = batch(*words, "--out", tmp_path / "out")
     assert result.return_value == 0 and "! a: no page: no ink" in result.output
 

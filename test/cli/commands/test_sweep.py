@@ -13,9 +13,9 @@ from click.testing import CliRunner, Result
 from detector.tiny_model import save_constant_model, tf_outputs
 from recording.sample_folders import tum_folder
 
-from objreg_tools.cli import sweep_work
-from objreg_tools.cli.batch_work import BatchWork
 from objreg_tools.cli.commands.sweep import command
+from objreg_tools.cli.many import sweep_work
+from objreg_tools.cli.many.batch_work import BatchWork
 from objreg_tools.workers import Done
 
 ODDS = ("--set", "registrar.least_odds=20,75,300")

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_tools.cli.sweep_grid import MOST, Grid, default_of
+from objreg_tools.cli.many.sweep_grid import MOST, Grid, default_of
 
 ODDS, SEED = "registrar.least_odds", "registrar.seed"
 MANY = f"{SEED}={','.join(map(str, range(MOST)))}"

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from recording.sample_folders import tum_folder
 
-from objreg_tools.cli import batch_work
-from objreg_tools.cli.batch_work import BatchWork
+from objreg_tools.cli.many import batch_work
+from objreg_tools.cli.many.batch_work import BatchWork
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
 

@@ -16,7 +16,7 @@ from objreg_ros import share
 from objreg_ros.data.images import ColourImage, Detections
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.whole_file import write_whole
-from objreg_tools.cli.batch_work import BatchWork
+from objreg_tools.cli.many.batch_work import BatchWork
 from objreg_tools.offline.stages import Detects
 from objreg_tools.report.run.pictures import Album
 from objreg_tools.report.run.revisits import Revisit

@@ -8,11 +8,11 @@ import pytest
 from recording.sample_folders import tum_folder
 
 from objreg_ros.data.images import ColourImage, Detections
-from objreg_tools.cli import sweep_work
-from objreg_tools.cli.batch_work import BatchWork
+from objreg_tools.cli.many import sweep_work
+from objreg_tools.cli.many.batch_work import BatchWork
+from objreg_tools.cli.many.sweep_work import Remembering, RevisitsFile, Share, shares, split, work
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import read_settings
-from objreg_tools.cli.sweep_work import Remembering, RevisitsFile, Share, shares, split, work
 
 REC = Path("/r/a")
 

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many recordings, and many settings of their parameters, over workers."""
