@@ -12,7 +12,8 @@ SHOWN = "[...document.querySelector('article.run').querySelectorAll('tbody tr:no
 def walk(browser: Any, page: Path) -> None:
     """Read the verdict, look at the refused pairs of one reason, open the first and the one after it."""
     browser.get(page.resolve().as_uri())
-    assert "none of the " in browser.find_element("tag name", "body").text
+    text = browser.find_element("tag name", "body").text
+    assert "none of the " in text, text[:1500]
     everything = browser.execute_script(f"return {SHOWN}.length")
 
     reason = browser.execute_script("const one = document.querySelector('.filter'); return one.options[1].value")
@@ -43,8 +44,8 @@ def _place(browser: Any) -> str:
     """Which of the pairs the open pane says it shows, with both of its pictures drawn."""
     pane = browser.find_element("css selector", "dialog[open]")
     drawn = browser.execute_script(
-        "return Promise.all([...arguments[0].querySelectorAll('.from img, .to img')].map((i) => i.decode()))"
-        ".then(() => [...arguments[0].querySelectorAll('.from img, .to img')].filter((i) => i.naturalWidth).length)",
+        "return Promise.all([...arguments[0].querySelectorAll('.ends img')].map((i) => i.decode()))"
+        ".then(() => [...arguments[0].querySelectorAll('.ends img')].filter((i) => i.naturalWidth).length)",
         pane,
     )
     assert drawn == 2
