@@ -14,7 +14,7 @@ import pytest
 from objreg_ros.native import sources
 
 
-def tests_of_kernels(repository: Path) -> list[str]:
+def files_of_kernels(repository: Path) -> list[str]:
     """The test file of each file with kernels."""
     headers = [path for path in sources.source_files(repository) if "METHODS[]" in path.read_text()]
     mirrored = {
@@ -28,7 +28,7 @@ def tests_of_kernels(repository: Path) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("objreg_ros.native.checked") is None, reason="build with OBJREG_CHECKED=1")
 def test_no_kernel_looks_beside_an_array_in_its_own_tests(repository: Path) -> None:
-    files = tests_of_kernels(repository)
+    files = files_of_kernels(repository)
     assert len(files) > 25
     words = [sys.executable, "-m", "pytest", "-p", "no:dash", "-p", "no:cacheprovider", "-q", "-x", "-m", "not slow"]
     done = subprocess.run(
