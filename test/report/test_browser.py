@@ -94,6 +94,16 @@ def test_a_row_opens_a_pair_with_both_pictures_and_the_overlay(browser: Any) -> 
     assert pane(browser) == {}
 
 
+def test_enter_on_a_row_opens_its_own_pair_and_escape_closes_it(browser: Any) -> None:
+    for pair in ("c2", "c4"):
+        row = browser.find_element("css selector", f"article.run tr[data-pair={pair}]")
+        browser.execute_script("arguments[0].focus()", row)
+        browser.switch_to.active_element.send_keys("\n")
+        assert pane(browser)["space"] == pair
+        browser.switch_to.active_element.send_keys("\ue00c")
+        assert pane(browser) == {} and browser.switch_to.active_element == row
+
+
 def test_a_closure_in_the_drawing_opens_its_pair(browser: Any) -> None:
     click(browser, "article.run svg .hit[data-pair=c2]")
     assert pane(browser)["space"] == "c2"

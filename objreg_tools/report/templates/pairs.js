@@ -169,7 +169,9 @@ function browse(article) {
     if (chosen) open(chosen.dataset.pair);
   });
   body.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") open(event.target.closest("tr").dataset.pair);
+    if (event.key !== "Enter") return;
+    event.preventDefault(); // or the key also presses the button that has the focus once the pane is open
+    open(event.target.closest("tr").dataset.pair);
   });
   pane.addEventListener("keydown", (event) => {
     if (event.key === "ArrowRight") step(1);
