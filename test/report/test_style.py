@@ -54,13 +54,20 @@ def test_every_colour_that_is_used_is_there_in_light_and_in_dark() -> None:
 @pytest.mark.parametrize("ground", ["page", "card"])
 def test_what_is_read_stands_out_from_what_it_is_written_on(colours: dict[str, str], ground: str) -> None:
     assert contrast(colours["ink"], colours[ground]) > 7.0
-    assert contrast(colours["soft"], colours[ground]) > 4.5
+    for name in ("soft", "accepted", "false", "refused", "corrected"):  # of words, verdicts and links
+        assert contrast(colours[name], colours[ground]) > 4.5, name
 
 
 @pytest.mark.parametrize("colours", [LIGHT, DARK], ids=["light", "dark"])
 def test_lines_and_verdicts_stand_out_from_a_card(colours: dict[str, str]) -> None:
     for name in ("true", "odometry", "corrected", "accepted", "false", "refused"):
         assert contrast(colours[name], colours["card"]) > 3.0, name
+
+
+def test_no_words_have_the_colour_of_faint_lines() -> None:
+    sheets = CSS + "".join(file.read_text() for file in TEMPLATES.glob("*.j2"))
+    faint = re.findall(r"([^{}\n]*?) *\{[^{}]*(?<!-)(?:color|fill): var\(--faint\)", sheets)
+    assert faint == [".dot.faint"]
 
 
 def test_every_rule_is_closed_and_none_ends_the_style_of_the_page() -> None:
