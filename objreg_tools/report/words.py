@@ -9,6 +9,13 @@ def number_of(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def reading(value: float | None) -> str:
+    """``5,980``, ``0.0323``; ``unknown`` for what was not measured."""
+    if value is None:
+        return "unknown"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+
+
 def judgement(false: int, judged: int, count: int) -> str:
     """How many of so many constraints are false, of those that truth can judge."""
     if not judged:

@@ -5,11 +5,16 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_tools.report.words import change, judgement, number_of
+from objreg_tools.report.words import change, judgement, number_of, reading
 
 
 def test_one_is_singular() -> None:
     assert [number_of(count, "loop") for count in (0, 1, 2)] == ["0 loops", "1 loop", "2 loops"]
+
+
+def test_a_reading_has_three_digits_or_all_that_stand_before_the_point() -> None:
+    said = [reading(value) for value in (None, 0.0, 0.03234, 210.4, 5980.0, -1234.5)]
+    assert said == ["unknown", "0", "0.0323", "210", "5,980", "-1,234"]
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,7 @@ from objreg_tools.rehearsal import SeesNothing
 from objreg_tools.report.pair.pair_page import Seen, pair_page
 from objreg_tools.report.pair.registered_pair import RegisteredPair, register_pair
 from objreg_tools.report.run.pictures import Album
+from objreg_tools.report.words import reading
 
 ASKED = ("model", "labels", "camera", "params_file", "changes", "remaps", "detections")
 
@@ -169,7 +170,7 @@ def candidate_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
         f"{row['violations']:.3f}",
         "" if grey is None else f"{grey:.2f}",
         ", ".join(row["matched"]) or "-",
-        f"{row['odds']:.3g}",
+        reading(row["odds"]),
         "" if error is None else f"{error['rotation_deg']:.1f}° {error['translation_cm']:.1f} cm",
     )
 
@@ -177,11 +178,8 @@ def candidate_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 def _say_odds(odds: Mapping[str, Any] | None) -> None:
     if odds is None:
         return
-    lines = [
-        (term["phrase"], "unknown" if term["reading"] is None else f"{term['reading']:.3g}", f"{term['weight']:+.2f}")
-        for term in odds["terms"]
-    ]
-    total = ("sum: odds", f"{odds['odds']:.3g}", f"{odds['sum']:+.2f}")
+    lines = [(term["phrase"], reading(term["reading"]), f"{term['weight']:+.2f}") for term in odds["terms"]]
+    total = ("sum: odds", reading(odds["odds"]), f"{odds['sum']:+.2f}")
     asked = ("asked for", f"{odds['least_odds']:g}", f"{odds['least']:+.2f}")
     rows = [("prior", "", f"{odds['prior']:+.2f}"), *lines, total, asked]
     click.echo(columns(("evidence of the best", "reading", "weight"), rows) + "\n")

@@ -19,6 +19,7 @@ from objreg_tools.report.page import environment
 from objreg_tools.report.pair.registered_pair import RegisteredPair
 from objreg_tools.report.run.pictures import WIDTH, data_uri, overlay, picture_uri
 from objreg_tools.report.run.reasons import MEANINGS
+from objreg_tools.report.words import reading
 
 SCALE = 2  # times `WIDTH`, of the picture of matches
 AGREES_PX = 6.0  # of the first picture at `WIDTH`, within which a pose brings two matched keypoints together
@@ -49,7 +50,9 @@ def pair_page(name: str, summary: Mapping[str, Any], found: RegisteredPair, seen
         matches = _matches(first.image, second.image, found.matches, T)
     meaning = "" if summary["accepted"] else MEANINGS.get(summary["reason"], "")
     template = environment().get_template("pair.html.j2")
-    return template.render(name=name, pair=summary, pictures=pictures, matches=matches, meaning=meaning)
+    return template.render(
+        name=name, pair=summary, pictures=pictures, matches=matches, meaning=meaning, reading=reading
+    )
 
 
 def _picture(seen: Seen, keyframe: Keyframe) -> str:
