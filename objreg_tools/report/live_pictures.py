@@ -74,7 +74,8 @@ def _draw_box(picture: Array, xyxy: Array, name: str) -> None:
     x_min, y_min, x_max, y_max = (round(float(value)) for value in xyxy)
     cv2.rectangle(picture, (x_min, y_min), (x_max, y_max), (255, 255, 255), 1, cv2.LINE_AA)
     (width, height), base = cv2.getTextSize(name, FONT, FONT_SIZE, 1)
-    left, bottom = x_min + 1, max(y_min, 0) + height + base + 2
+    left = max(0, min(x_min + 1, picture.shape[1] - width - 4))  # a name ends where the picture does
+    bottom = max(y_min, 0) + height + base + 2
     cv2.rectangle(picture, (left, bottom - height - base - 1), (left + width + 3, bottom), (0, 0, 0), cv2.FILLED)
     cv2.putText(picture, name, (left + 2, bottom - base), FONT, FONT_SIZE, (255, 255, 255), 1, cv2.LINE_AA)
 

@@ -44,6 +44,17 @@ def test_a_box_is_drawn_with_its_name(tmp_path: Path) -> None:
     assert (picture[50, 20:61] > 100).all() and picture[52:].max() == 0 and picture[14:26, 22:50].max() > 100
 
 
+def test_a_name_at_the_edge_of_a_picture_is_drawn_whole(tmp_path: Path) -> None:
+    widths = []
+    for x_min in (5, 80):
+        box = np.array([[x_min, 10, 99, 70]], np.float32)
+        seen = Detections(xyxy=box, score=np.array([0.5], np.float32), label=("c",), image_hw=(80, 100), stamp_ns=0)
+        draw_sight(tmp_path / "detections.png", np.full((80, 100, 3), 100, np.uint8), CAMERA, seen, [])
+        black = (cv2.imread(str(tmp_path / "detections.png")) == 0).all(axis=-1)
+        widths.append(np.ptp(np.flatnonzero(black.any(axis=0))))
+    assert widths[0] == widths[1] > 20
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [("nowhere/a.png", "expected a place that takes it"), ("a.xyz", r"expected a name like picture\.png")],
