@@ -56,7 +56,7 @@ class Witness:
         self.seen: dict[int, float] = {}
         self.done: dict[tuple[str, int], float] = {}
         self.searched: dict[int, float] = {}  # of each frame that completed a keyframe, when its search was over
-        self.told: list[tuple[int, float]] = []  # of each constraint the image that it is about, and when
+        self.constraints: list[tuple[int, float]] = []  # of each constraint the image that it is about, and when
         self._stamp_ns = stamp_ns
         self._context = Context()
         self._context.init()
@@ -81,7 +81,7 @@ class Witness:
             self.done[frame] = now
 
     def _receive(self, constraint: Any) -> None:
-        self.told.append((self._stamp_ns(constraint), time.monotonic()))
+        self.constraints.append((self._stamp_ns(constraint), time.monotonic()))
 
     @property
     def span(self) -> tuple[float, float]:
@@ -107,14 +107,14 @@ class Witness:
     def constraint_ms(self) -> dict[str, dict[str, float]]:
         """The same to the constraints about an image: of all, and by what they waited for."""
         kinds: dict[str, list[tuple[int, float]]] = {"at_once": [], "proof": [], "others": []}
-        first = min((at for _, at in self.told), default=np.inf)
-        for stamp, at in self.told:
+        first = min((at for _, at in self.constraints), default=np.inf)
+        for stamp, at in self.constraints:
             if stamp in self.seen:
                 own = at < self._searched_at(stamp) + ORDER_S
                 kinds["at_once" if own else "proof" if self.seen[stamp] < first else "others"].append((stamp, at))
         completed = [(stamp, self.done["registrar", self._completing(stamp)]) for stamp, _ in kinds["at_once"]]
         apart = {name: self._latency_ms(ends) for name, ends in kinds.items()}
-        return {"all": self._latency_ms(self.told), **apart, "keyframe": self._latency_ms(completed)}
+        return {"all": self._latency_ms(self.constraints), **apart, "keyframe": self._latency_ms(completed)}
 
     def _completing(self, stamp_ns: int) -> int:
         """The frame that completed the keyframe which an image is of; 0 for none."""
@@ -241,10 +241,10 @@ def measure(path: Path, setup: Setup) -> dict[str, Any]:
             live = run_live(path, setup, Path(logs), lambda words: click.echo(words, err=True))
             usage = meter.figures(*witness.span)
             latency = {node: witness.latency_ms(node) for node in STAGES}
-            told, search = witness.constraint_ms(), witness.search_ms()
+            constraints, search = witness.constraint_ms(), witness.search_ms()
         finally:
             witness.close()
-        figures = {"end_to_end_ms": latency, "search_ms": search, "constraint_ms": told}
+        figures = {"end_to_end_ms": latency, "search_ms": search, "constraint_ms": constraints}
         return {**figures, "books": books_of(live), "usage": usage}
 
 
@@ -256,9 +256,9 @@ def totals(usage: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
 
 def line_of(row: Mapping[str, Any]) -> str:
     """One run in a line."""
-    end_to_end, told = row["end_to_end_ms"]["registrar"], row["constraint_ms"]
+    end_to_end, constraints = row["end_to_end_ms"]["registrar"], row["constraint_ms"]
     usage = f"usage {row['usage']}, together {totals(row['usage'])}"
-    return f"end to end {end_to_end}, search {row['search_ms']}, constraints {told}, {usage}"
+    return f"end to end {end_to_end}, search {row['search_ms']}, constraints {constraints}, {usage}"
 
 
 def compare(path: Path, node_args: Mapping[str, list[str]], rounds: int) -> dict[str, Any]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from peers import Shot
@@ -15,7 +14,6 @@ from stills import stills
 
 from objreg_ros import share
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.data.frames import Frame
 from objreg_ros.data.images import ColourImage, DepthImage, Detections
 from objreg_ros.detector.detector import Detector
@@ -24,6 +22,7 @@ from objreg_ros.geometry import pose, rotation_between
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor.depth_to_colour import DepthToColour
+from objreg_tools.cli.looks.moments import KeepsFrames, Remembering
 from objreg_tools.offline.line import run_offline
 from objreg_tools.offline.stages import Stages
 from objreg_tools.recording import Recording, open_recording
@@ -39,50 +38,6 @@ SIMULATED = {"covariance_calibration": 0.01}  # such a camera is as its calibrat
 LEAST_VISIBLE = 0.3
 Jitter = tuple[float, float]  # by which each pose of odometry errs for itself: degrees, cm
 NO_JITTER: Jitter = (0.0, 0.0)
-
-
-@dataclass
-class Outcome:
-    """No closures and no refusals."""
-
-    closures: tuple[LoopClosure, ...] = ()
-    rejected: tuple[Rejected, ...] = ()
-
-
-@dataclass
-class Collector:
-    """In the registrar's stead: keeps the frames."""
-
-    frames: list[Frame] = field(default_factory=list)
-
-    tracked = relocalised = None  # it follows no camera
-    whereabouts = ""
-
-    def counts(self) -> dict[str, int]:
-        """It has no store."""
-        return {}
-
-    def process(self, frame: Frame) -> Outcome:
-        """Keep it."""
-        self.frames.append(frame)
-        return Outcome()
-
-    def finish(self, doubt: str = "") -> Outcome:
-        """Nothing is left."""
-        return Outcome()
-
-
-class Remembered:
-    """A detector that can be asked again what it saw."""
-
-    def __init__(self, detector: Any) -> None:
-        self._detector = detector
-        self.seen: dict[int, Detections] = {}
-
-    def detect(self, image: ColourImage) -> Detections:
-        """As the detector says."""
-        self.seen[image.stamp_ns] = self._detector.detect(image)
-        return self.seen[image.stamp_ns]
 
 
 class TrueBoxes:
@@ -198,8 +153,8 @@ def _is_simulated(path: Path) -> bool:
 
 def _frames(recording: Recording, asked: DetectorParams, reading: Reading) -> tuple[list[Frame], dict[int, Detections]]:
     inputs = choose_inputs(recording.topics)
-    detector = Remembered(_detector(recording, asked))
-    collector, segmenter = Collector(), Segmenter(SegmenterParams())
+    detector = Remembering(_detector(recording, asked))
+    collector, segmenter = KeepsFrames(), Segmenter(SegmenterParams())
     if not reading.registered:
         segmenter.sensor.depth_to_colour = Unturned()
     run_offline(stills(recording, inputs, reading.every), Stages(detector, segmenter, collector), inputs)

@@ -66,6 +66,34 @@ def of_run(command: Callable) -> Callable:
     return command
 
 
+ONE_THREAD = ("registrar.threads=1", "detector.threads=1")  # of a run beside which others run
+
+
+def over_workers(command: Callable) -> Callable:
+    """Many ``recordings``, where their results go (``out``), and who runs them: ``workers``, or a ``scheduler``'s."""
+    recording = RecordingPath(path_type=Path, resolve_path=True)
+    recordings = click.argument("recordings", nargs=-1, required=True, type=recording, metavar="RECORDINGS…")
+    out = click.option(
+        "--out",
+        required=True,
+        type=OutputPath(file_okay=False, path_type=Path, resolve_path=True),
+        help="The folder of the results; all workers have to see it, and the recordings, at the same path.",
+    )
+    here, cluster = (
+        "Processes of this machine; one for each core by default.",
+        "A Dask cluster in place of this machine.",
+    )
+    workers = click.option("--workers", type=click.IntRange(min=1), help=here)
+    scheduler = click.option("--scheduler", default="", metavar="tcp://HOST:PORT", help=cluster)
+    return recordings(out(workers(scheduler(command))))
+
+
+def require_one_place(workers: int | None, scheduler: str) -> None:
+    """UsageError where runs are to be on this machine and on a cluster."""
+    if scheduler and workers is not None:
+        raise click.UsageError("expected --workers or --scheduler, got both; a cluster has the workers that it has")
+
+
 def scene_files(command: Callable) -> Callable:
     """The files of a run for viewers, ``rerun`` and ``mcap``."""
     file = OutputPath(dir_okay=False, path_type=Path)

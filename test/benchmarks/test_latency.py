@@ -15,7 +15,7 @@ import pytest
 def witness(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A witness without a node, by a clock that `at` sets."""
     made = object.__new__(importlib.import_module("latency").Witness)
-    made.seen, made.done, made.searched, made.told = {}, {}, {}, []
+    made.seen, made.done, made.searched, made.constraints = {}, {}, {}, []
     made._stamp_ns = lambda message: message.stamp
     made.at = lambda now_s: monkeypatch.setattr(time, "monotonic", lambda: now_s)
     return made
@@ -40,7 +40,7 @@ def test_constraints_are_sorted_by_what_they_waited_for(witness: Any) -> None:
     for stamp in (5, 15, 25, 35):  # each completes a keyframe
         acknowledge(witness, stamp + 0.1, stamp, "registrar followed")
         acknowledge(witness, stamp + 0.3, stamp, "registrar published")
-    witness.told = [(3, 15.3), (14, 15.3), (24, 35.2), (34, 35.2)]
+    witness.constraints = [(3, 15.3), (14, 15.3), (24, 35.2), (34, 35.2)]
     found = witness.constraint_ms()
     assert [found[kind]["frames"] for kind in ("all", "at_once", "proof", "others")] == [4.0, 2.0, 1.0, 1.0]
     assert found["others"]["p50"] == pytest.approx(11_200.0)

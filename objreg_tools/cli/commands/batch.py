@@ -15,7 +15,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import NOTHING, options
 from objreg_tools.cli.many.batch_work import BatchWork, read_result
-from objreg_tools.cli.paths import InputPath, OutputPath, RecordingPath
+from objreg_tools.cli.paths import InputPath
 from objreg_tools.cli.progress import frame_bar
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.run_output import print_next
@@ -28,22 +28,11 @@ from objreg_tools.report.batch.batch_tables import batch_tables, require_pyarrow
 from objreg_tools.workers import require_dask, spread
 
 PAGE = "report.html"
-ONE_THREAD = ("registrar.threads=1", "detector.threads=1")
 HEAD = f"{'recording':32} {'frames':>7} {'constraints':>12} {'false':>6} {'s':>7}"
 
 
 @click.command()
-@click.argument(
-    "recordings", nargs=-1, required=True, type=RecordingPath(path_type=Path, resolve_path=True), metavar="RECORDINGS…"
-)
-@click.option(
-    "--out",
-    required=True,
-    type=OutputPath(file_okay=False, path_type=Path, resolve_path=True),
-    help="The folder of the results; all workers have to see it, and the recordings, at the same path.",
-)
-@click.option("--workers", type=click.IntRange(min=1), help="Processes of this machine; one for each core by default.")
-@click.option("--scheduler", default="", metavar="tcp://HOST:PORT", help="A Dask cluster in place of this machine.")
+@options.over_workers
 @click.option(
     "--against",
     type=InputPath(exists=True, file_okay=False, path_type=Path, resolve_path=True),
@@ -69,10 +58,9 @@ def command(
     What is done is not done again by the same command, unless the settings, the program or the recording have changed
     since. A recording that fails stops no other. Ends with 3 if one failed or none of its frames got through.
     """
-    if scheduler and workers is not None:
-        raise click.UsageError("expected --workers or --scheduler, got both; a cluster has the workers that it has")
+    options.require_one_place(workers, scheduler)
     require_dask(), require_pyarrow()
-    asked = RecordedOptions.of(**{**given, "changes": (*ONE_THREAD, *given["changes"])})
+    asked = RecordedOptions.of(**{**given, "changes": (*options.ONE_THREAD, *given["changes"])})
     _require_own_memory(asked)
     print_ignored(asked.settings)
     out.mkdir(parents=True, exist_ok=True)

@@ -17,7 +17,6 @@ from objreg_tools.cli import NOTHING, options
 from objreg_tools.cli.many.batch_work import BatchWork
 from objreg_tools.cli.many.sweep_grid import Combination, Grid, default_of
 from objreg_tools.cli.many.sweep_work import Failures, RevisitsFile, Share, shares, split, work
-from objreg_tools.cli.paths import OutputPath, RecordingPath
 from objreg_tools.cli.progress import frame_bar
 from objreg_tools.cli.recorded import RecordedOptions
 from objreg_tools.cli.settings import print_ignored
@@ -30,24 +29,13 @@ from objreg_tools.report.sweep.sweep_rows import Found, Setting, best_of, ranked
 from objreg_tools.report.sweep.sweep_tables import as_json, as_yaml, write_parquet
 from objreg_tools.workers import cores, require_dask, spread
 
-ONE_THREAD = ("registrar.threads=1", "detector.threads=1")
 RUNS, REVISITS = "runs", "revisits"
 ON_CLUSTER = 64  # workers that a cluster is taken to have, when work is parted
 HEAD = f"{'closed':>13} {'false':>6} {'constraints':>12}  values"
 
 
 @click.command()
-@click.argument(
-    "recordings", nargs=-1, required=True, type=RecordingPath(path_type=Path, resolve_path=True), metavar="RECORDINGS…"
-)
-@click.option(
-    "--out",
-    required=True,
-    type=OutputPath(file_okay=False, path_type=Path, resolve_path=True),
-    help="The folder of the results; all workers have to see it, and the recordings, at the same path.",
-)
-@click.option("--workers", type=click.IntRange(min=1), help="Processes of this machine; one for each core by default.")
-@click.option("--scheduler", default="", metavar="tcp://HOST:PORT", help="A Dask cluster in place of this machine.")
+@options.over_workers
 @options.of_run
 def command(recordings: tuple[Path, ...], out: Path, workers: int | None, scheduler: str, **given: Any) -> int:
     """Run RECORDINGS with every combination of the values that --set gives: --set registrar.least_odds=20,75,300.
@@ -63,8 +51,7 @@ def command(recordings: tuple[Path, ...], out: Path, workers: int | None, schedu
     Writes into OUT a page with curves, report.html, sweep.json, sweep.parquet, and the JSON of every run. What is done
     is not done again. Ends with 3 if a run failed.
     """
-    if scheduler and workers is not None:
-        raise click.UsageError("expected --workers or --scheduler, got both; a cluster has the workers that it has")
+    options.require_one_place(workers, scheduler)
     require_dask(), require_pyarrow()
     grid, paths = Grid.of(given["changes"]), list(dict.fromkeys(recordings))
     runs = _runs(grid, out, given)
@@ -83,7 +70,7 @@ def _runs(grid: Grid, out: Path, given: Mapping[str, Any]) -> list[tuple[Combina
     """The work of each combination, in a folder of its own. ValueError for values that are refused."""
     runs = []
     for combination in grid.combinations:
-        changes = (*ONE_THREAD, *grid.fixed, *combination.changes)
+        changes = (*options.ONE_THREAD, *grid.fixed, *combination.changes)
         asked = RecordedOptions.of(**{**given, "changes": changes})
         if asked.settings.of("registrar", RegistrarParams).store:
             raise ValueError("registrar.store: expected none, since each run has its own memory; leave it out")
