@@ -31,6 +31,7 @@ from golden.comparison import differences  # noqa: E402
 from objreg_ros import share  # noqa: E402
 from objreg_ros.detector.detector import Detector  # noqa: E402
 from objreg_ros.detector.params import DetectorParams  # noqa: E402
+from objreg_tools.cli.looks.moments import Remembering  # noqa: E402
 
 SHARED = Path(os.environ.get("OBJREG_SHARED", TEST.parents[1] / "shared"))
 COCO, COCO_THRESHOLD = "models/ssd_mobilenet_v1_coco_int8.onnx", 0.4
@@ -95,7 +96,7 @@ def _recorded(name: str, source: runs.Source, before: files.Golden | None, asked
         else:
             path = runs.simulated(source, folder / name)
         fresh = before is None or asked.detect
-        detector = runs.Remembered(_model(source, asked.shared) if fresh else runs.Stored(before.detections))
+        detector = Remembering(_model(source, asked.shared) if fresh else runs.Stored(before.detections))
         run = runs.run(path, detector, source.frames, lambda done: bar.update(done - bar.n))
         return files.Golden(detector.seen, runs.results(run))
 

@@ -70,19 +70,6 @@ class Stored:
         return self.seen[image.stamp_ns]
 
 
-class Remembered:
-    """A detector that remembers what it saw."""
-
-    def __init__(self, detector: Detects) -> None:
-        self._detector = detector
-        self.seen: dict[int, Detections] = {}
-
-    def detect(self, image: ColourImage) -> Detections:
-        """As the detector says."""
-        self.seen[image.stamp_ns] = self._detector.detect(image)
-        return self.seen[image.stamp_ns]
-
-
 def simulated(told: Told, folder: Path, progress: Progress = lambda done: None) -> Path:
     """The recording, written into a new folder."""
     sensors = sensors_of(camera_of(told.camera, None), told.stress, ())

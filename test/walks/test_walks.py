@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Six users walk through what there is, each by what the last command told, and none comes to a dead end."""
+"""Six users walk through what there is, each by what the last command said, and none comes to a dead end."""
 
 from __future__ import annotations
 
