@@ -12,7 +12,7 @@ from objreg_ros.diagnostics import Diagnostics, family, reading
 
 # What stands before the names of families that are also read: here, and by tests and tools.
 DROPPED, LOST, CONNECTED = "dropped: ", "lost in transport: ", "connected: "
-LATENCY, MALFORMED = "latency ", "malformed "
+LATENCY, MALFORMED, FOUND = "latency ", "malformed ", "found: "
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ class CommonDiagnostics(Diagnostics):
         "messages",
     )
     found: Mapping[str, str] = family(
-        "found: <anchor>",
+        f"{FOUND}<anchor>",
         "What [does not fit](troubleshooting.md#streams-that-are-not-what-they-say) in the stream of a registrar or "
         "keyframer, or in the map of a mapper: what was measured, the cause, what to do. The level is WARN while there "
         "is one, and the key goes when it fits again.",

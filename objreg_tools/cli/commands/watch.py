@@ -3,17 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import click
 
+from objreg_tools.cli.watching.listening import listening
 from objreg_tools.cli.watching.server import served
 from objreg_tools.cli.watching.watched import Watched
 
 if TYPE_CHECKING:
-    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.context import Context
+    from rclpy.node import Node
 
 PORT = 8765
 
@@ -35,9 +35,10 @@ def command(port: int, namespace: str, remaps: tuple[str, ...]) -> None:
         if not all(remap.partition(":=")):
             raise ValueError(f"--remap: expected NAME:=TOPIC, got {remap!r}")
     rules = [*remaps, *([f"__ns:=/{namespace.strip('/')}"] if namespace else [])]
+    ros_args = [word for rule in rules for word in ("-r", rule)]
     watched = Watched()
     with (
-        _listening(watched, [word for rule in rules for word in ("-r", rule)]) as executor,
+        listening(lambda context: _node(context, watched, ros_args), ros_args) as executor,
         served(watched, port) as address,
     ):
         click.echo(f"{address} shows the graph; Ctrl-C ends it")
@@ -45,32 +46,7 @@ def command(port: int, namespace: str, remaps: tuple[str, ...]) -> None:
             executor.spin_once(timeout_sec=0.2)
 
 
-@contextmanager
-def _listening(watched: Watched, ros_args: list[str]) -> Iterator[SingleThreadedExecutor]:
-    """What lets messages come in, for the time of a with block."""
-    from objreg_ros.bridge.process import profile
+def _node(context: Context, watched: Watched, ros_args: list[str]) -> Node:
+    from objreg_tools.cli.watching.topics import watch  # which knows ROS
 
-    profile.apply()
-    from rclpy.context import Context
-    from rclpy.exceptions import InvalidNamespaceException, InvalidTopicNameException
-    from rclpy.executors import SingleThreadedExecutor
-
-    from objreg_ros.bridge.process.lifetime import REFUSED
-    from objreg_tools.cli.watching.topics import watch
-
-    context = Context()
-    context.init(args=[])  # not the command line: its --remap is not for ROS
-    try:
-        try:
-            node = watch(context, watched, ros_args)
-        except (*REFUSED, InvalidNamespaceException, InvalidTopicNameException) as error:
-            raise ValueError(f"expected names that ROS takes, got {' '.join(ros_args)} ({error})") from error
-        executor = SingleThreadedExecutor(context=context)
-        executor.add_node(node)
-        try:
-            yield executor
-        finally:
-            node.destroy_node()
-            executor.shutdown()  # last, as in `player`
-    finally:
-        context.try_shutdown()
+    return watch(context, watched, ros_args)

@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers
-from objreg_tools.cli.watching.watched import NodeReport, Sight, Watched
+from objreg_tools.cli.watching.listening import careful
+from objreg_tools.cli.watching.reports import report_of
+from objreg_tools.cli.watching.watched import Sight, Watched
 
 if TYPE_CHECKING:
     from rclpy.context import Context
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
 
 RECENT = 12  # pictures and tables of detections that wait for their objects
 NEAR_NS = 50_000_000  # depth and colour of one frame
-COUNTS = ("constraints", "stored keyframes", "stored objects", "stored landmarks", "waiting keyframes")
 
 
 def watch(context: Context, watched: Watched, ros_args: Sequence[str]) -> Node:
@@ -40,12 +41,12 @@ def _listen_to_results(node: Node, watched: Watched) -> None:
     from objreg_ros.bridge.node import qos
 
     take = _Results(watched)
-    node.create_subscription(DiagnosticArray, "/diagnostics", _careful(node, take.counters), qos.stage(depth=100))
-    node.create_subscription(DiagnosticArray, "acceptances", _careful(node, take.acceptances), qos.stage(qos.REFUSALS))
-    node.create_subscription(DiagnosticArray, "refusals", _careful(node, take.refusals), qos.stage(qos.REFUSALS))
-    node.create_subscription(MarkerArray, "markers", _careful(node, take.markers), qos.latched())
-    node.create_subscription(Odometry, "odom", _careful(node, take.odometry), qos.sensor(False, 100))
-    node.create_subscription(Path, "path", _careful(node, take.path), qos.latched())
+    node.create_subscription(DiagnosticArray, "/diagnostics", careful(node, take.counters), qos.stage(depth=100))
+    node.create_subscription(DiagnosticArray, "acceptances", careful(node, take.acceptances), qos.stage(qos.REFUSALS))
+    node.create_subscription(DiagnosticArray, "refusals", careful(node, take.refusals), qos.stage(qos.REFUSALS))
+    node.create_subscription(MarkerArray, "markers", careful(node, take.markers), qos.latched())
+    node.create_subscription(Odometry, "odom", careful(node, take.odometry), qos.sensor(False, 100))
+    node.create_subscription(Path, "path", careful(node, take.path), qos.latched())
 
 
 def _listen_to_pictures(node: Node, take: _Pictures) -> None:
@@ -54,24 +55,12 @@ def _listen_to_pictures(node: Node, take: _Pictures) -> None:
 
     from objreg_ros.bridge.node import qos
 
-    node.create_subscription(String, "labels", _careful(node, take.labels), qos.latched())
-    node.create_subscription(Image, "image", _careful(node, take.image), qos.sensor(False, 2))
-    node.create_subscription(CompressedImage, "image/compressed", _careful(node, take.image), qos.sensor(False, 2))
-    node.create_subscription(CameraInfo, "camera_info", _careful(node, take.camera), qos.sensor(False, 2))
-    node.create_subscription(PointCloud2, "detections_table", _careful(node, take.detections), qos.stage())
-    node.create_subscription(PointCloud2, "objects", _careful(node, take.objects), qos.stage())
-
-
-def _careful(node: Node, take: Callable[[Any], None]) -> Callable[[Any], None]:
-    """A callback that passes over a message that breaks its contract, with a line in the log now and then."""
-
-    def callback(message: Any) -> None:
-        try:
-            take(message)
-        except (ValueError, KeyError, TypeError) as error:
-            node.get_logger().warn(f"passed over: {error}", throttle_duration_sec=5.0)
-
-    return callback
+    node.create_subscription(String, "labels", careful(node, take.labels), qos.latched())
+    node.create_subscription(Image, "image", careful(node, take.image), qos.sensor(False, 2))
+    node.create_subscription(CompressedImage, "image/compressed", careful(node, take.image), qos.sensor(False, 2))
+    node.create_subscription(CameraInfo, "camera_info", careful(node, take.camera), qos.sensor(False, 2))
+    node.create_subscription(PointCloud2, "detections_table", careful(node, take.detections), qos.stage())
+    node.create_subscription(PointCloud2, "objects", careful(node, take.objects), qos.stage())
 
 
 class _Results:
@@ -81,17 +70,8 @@ class _Results:
         self._watched = watched
 
     def counters(self, message: Any) -> None:
-        from objreg_ros.bridge.node.diagnostics import REJECTED, balance_of
-
-        for status in message.status:
-            if status.hardware_id == "objreg_ros":
-                values = {pair.key: pair.value for pair in status.values}
-                refused = {
-                    key.removeprefix(REJECTED): int(value) for key, value in values.items() if key.startswith(REJECTED)
-                }
-                counts = {key: values[key] for key in COUNTS if key in values}
-                made = NodeReport(balance_of(status), status.level != b"\x00", status.message)
-                self._watched.report(status.name.removesuffix(": frames"), made, refused, counts)
+        for reported in filter(None, map(report_of, message.status)):
+            self._watched.report(*reported)
 
     def acceptances(self, message: Any) -> None:
         from objreg_ros.bridge.node.diagnostics import accepted_of

@@ -7,16 +7,16 @@ import threading
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 
-from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import ObjectCloud
 from objreg_ros.data.images import Detections, Intrinsics
+from objreg_tools.cli.watching.reports import NodeReport
 from objreg_tools.cli.watching.thinned import Point, Thinned
 from objreg_tools.report.live_pictures import sight
 from objreg_tools.report.stage_times import in_order
@@ -27,18 +27,7 @@ MOST_EDGES = 2000  # lines between keyframes
 MOST_OBJECTS = 500
 MOST_NODES = 32
 QUALITY = 80  # of the JPEG
-SILENT_S = 5.0  # a node that reported nothing for so long may have ended
 TEXT = 300  # characters of a text of another node that are shown
-
-
-@dataclass(frozen=True, slots=True)
-class NodeReport:
-    """The last status of a node: its counters, and whether it warns and of what."""
-
-    balance: Balance
-    warns: bool
-    message: str
-    at_s: float = field(default_factory=time.monotonic)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,13 +58,13 @@ class Watched:
         self._sight: Sight | None = None
         self._drawn: tuple[int, bytes] | None = None
 
-    def report(self, node: str, made: NodeReport, rejected: Mapping[str, int], counts: Mapping[str, str]) -> None:
+    def report(self, node: str, made: NodeReport) -> None:
         """A node reported its counters; a registrar its refusals by reason too, and what it stores."""
         with self._lock:
             if node in self._nodes or len(self._nodes) < MOST_NODES:
                 self._nodes[node] = made
-            self._rejected.update(rejected)
-            self._counts.update(counts)
+            self._rejected.update(made.rejected)
+            self._counts.update(made.counts)
 
     def accept(self, stamps_ns: tuple[int, int], labels: Sequence[str], evidence: Mapping[str, float]) -> None:
         """A constraint between the keyframes of two stamps was published."""
@@ -165,7 +154,7 @@ def _node(name: str, made: NodeReport) -> dict[str, Any]:
         "waiting": balance.waiting,
         "dropped": balance.dropped,
         "warns": made.warns,
-        "silent": time.monotonic() - made.at_s > SILENT_S,
+        "silent": made.is_silent(),
         "message": made.message[:TEXT],
         "stages": [[f"{stage}{part}", *times] for part, stage, times in in_order(balance.stage_ms)],
     }

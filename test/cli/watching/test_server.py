@@ -9,7 +9,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from objreg_tools.cli.watching.server import HERE, served
+from objreg_tools.cli.watching.local_pages import HERE
+from objreg_tools.cli.watching.server import served
 from objreg_tools.cli.watching.watched import Watched
 
 from .test_watched import picture

@@ -9,7 +9,8 @@ import numpy as np
 from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.data.images import Detections
 from objreg_tools.cli.watching import watched as module
-from objreg_tools.cli.watching.watched import MOST_EDGES, MOST_NODES, MOST_OBJECTS, RECENT, NodeReport, Sight, Watched
+from objreg_tools.cli.watching.reports import NodeReport
+from objreg_tools.cli.watching.watched import MOST_EDGES, MOST_NODES, MOST_OBJECTS, RECENT, Sight, Watched
 
 COUNTERS = Balance(9, 6, 1, {"overtaken": 2}, {}, {"total": (3.0, 5.0), "search": (7.0, 8.0), "keyframe": (9.0, 9.5)})
 
@@ -25,9 +26,9 @@ def picture(stamp_ns: int) -> Sight:
 def test_what_nodes_report_is_shown_with_stages_beside_their_totals() -> None:
     watched = Watched()
     watched.report(
-        "/registrar", NodeReport(COUNTERS, True, "nothing on odom"), {"no_candidate": 3}, {"constraints": "5"}
+        "/registrar", NodeReport(COUNTERS, True, "nothing on odom", {"no_candidate": 3}, {"constraints": "5"})
     )
-    watched.report("/detector", NodeReport(COUNTERS, False, "30 frames/s"), {}, {})
+    watched.report("/detector", NodeReport(COUNTERS, False, "30 frames/s"))
     state = json.loads(json.dumps(watched.as_json()))
     assert [node["name"] for node in state["nodes"]] == ["/detector", "/registrar"]
     assert state["nodes"][1]["stages"] == [["total", 3.0, 5.0], ["search, keyframe", 7.0, 8.0],
@@ -57,7 +58,7 @@ def test_whatever_is_published_for_however_long_takes_bounded_memory() -> None:
     watched = Watched()
     many = [(0.1 * k, 0.0, 0.0) for k in range(5000)]
     for k in range(200):
-        watched.report(f"/node{k}", NodeReport(COUNTERS, False, "x" * 10_000), {}, {})
+        watched.report(f"/node{k}", NodeReport(COUNTERS, False, "x" * 10_000))
         watched.accept((k, k), ["cup" * 1000], {})
         watched.refuse((k, k), "slack", "y" * 10_000)
     for point in many:
