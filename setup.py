@@ -128,6 +128,8 @@ setup(
         "report": ["matplotlib>=3.6", "plotly>=5.9"],
         # `objreg batch`: Dask's processes and clusters, and Parquet.
         "batch": ["distributed>=2024.1", "pyarrow>=14"],
+        # `objreg metrics`: a running graph for Prometheus.
+        "metrics": ["prometheus_client>=0.20"],
         # `--rerun`: a run as a recording for the Rerun viewer.
         "rerun": ["rerun-sdk>=0.23"],
         # The site of the documentation: `mkdocs build`.

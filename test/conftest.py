@@ -27,6 +27,7 @@ os.environ["XDG_DATA_HOME"] = tempfile.mkdtemp(prefix="objreg_data_")
 
 RUN_AT_LEAST = 1500  # of more than twice as many; without ROS, onnx, torch and recordings it is still fewer that skip
 OPTIONAL = {"rclpy", "launch_ros", "onnx", "torch", "gtsam", "mkdocs", "rerun", "distributed", "pyarrow"}
+OPTIONAL |= {"prometheus_client"}
 if find_spec("rclpy") is None:  # messages are a part of ROS; beside an rclpy, a missing one is an error
     OPTIONAL |= {f"{name}_msgs" for name in ("diagnostic", "geometry", "nav", "sensor", "std", "visualization")}
     OPTIONAL |= {"builtin_interfaces", "rcl_interfaces", "rosgraph_msgs", "std_srvs"}

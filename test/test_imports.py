@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-HEAVY = ("distributed", "gtsam", "matplotlib", "numba", "open3d", "plotly", "pyarrow", "rerun")
+HEAVY = ("distributed", "gtsam", "matplotlib", "numba", "open3d", "plotly", "prometheus_client", "pyarrow", "rerun")
 EXTRAS = ("click", "gtsam", "jinja2", "matplotlib", "open3d", "plotly", "rosbags", "tqdm")
 NODES = (*(f"objreg_ros.{stage}" for stage in ("detector", "segmenter", "registrar", "keyframes")), "objreg_mapper")
 CODE = "import importlib, sys; importlib.import_module(sys.argv[1]); print(*(set(sys.argv[2:]) & set(sys.modules)))"
@@ -24,6 +24,7 @@ def heavy_after(module: str) -> str:
     "module",
     ["objreg_ros", "objreg_ros.registration", "objreg_ros.segmenter.segment", "objreg_ros.registrar.registrar",
      "objreg_tools.cli.commands.offline", "objreg_tools.cli.commands.batch", "objreg_tools.cli.commands.demo",
+     "objreg_tools.cli.commands.metrics",
      "objreg_tools.report.exports.export"],
 )  # fmt: skip
 def test_a_module_loads_nothing_heavy_when_it_is_imported(module: str) -> None:

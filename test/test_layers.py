@@ -220,6 +220,7 @@ def test_onnxruntime_is_imported_in_one_file_only() -> None:
         ("distributed", {"objreg_tools.workers"}),
         ("pyarrow", {"objreg_tools.report.batch.batch_tables"}),
         ("plotly", {"objreg_tools.report.bundle"}),
+        ("prometheus_client", {"objreg_tools.cli.metrics.exposition"}),
     ],
 )
 def test_a_heavy_library_is_imported_only_where_it_is_used(library: str, users: set[str]) -> None:

@@ -37,6 +37,7 @@ SUMMARIES = {
     "sweep": "Run recordings with every combination of parameter values, and compare.",
     "replay": "Publish a recording into the live graph.",
     "watch": "Show a running graph on a page of this machine.",
+    "metrics": "Serve the counters of a running graph for Prometheus.",
     "convert": "Write any recording as rosbag2.",
     "export": "Write the objects of a store as PLY and JSON.",
     "simulate": "Make a recording with exact ground truth.",

@@ -38,6 +38,7 @@ EXTRAS = {  # module: the extra that brings it, and what for
     "matplotlib": ("report", "the demo's picture of the trajectory"),
     "open3d": ("paper", "the founding method, method: paper"),
     "plotly": ("report", "the views in 3D of a report"),
+    "prometheus_client": ("metrics", "the metrics of a running graph, objreg metrics"),
     "rerun": ("rerun", "recordings for the Rerun viewer"),
 }
 LEAST_DISK_BYTES = 1 << 29

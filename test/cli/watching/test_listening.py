@@ -2,9 +2,6 @@
 from __future__ import annotations
 
 import pytest
-
-pytest.importorskip("rclpy", reason="ROS 2 is not installed")
-
 from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import String
