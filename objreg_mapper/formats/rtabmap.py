@@ -37,10 +37,12 @@ def fill_link(link: Any, constraint: Constraint, from_id: int, to_id: int) -> An
 def fill_landmark(detection: Any, object_id: int, xyz: Array, sigma: float) -> Any:
     """The LandmarkDetection of ``xyz (3,)`` m in the frame of its header, ``sigma`` m certain.
 
-    ValueError for an id below 1.
+    ValueError for an id below 1, and for a ``sigma`` that is none: RTAB-Map would put its own in its place.
     """
     if object_id < 1:
         raise ValueError(f"expected a landmark's id of at least 1, got {object_id}")
+    if not 0 < sigma < np.inf:
+        raise ValueError(f"expected a landmark's sigma above 0 m, got {sigma}")
     detection.id = object_id
     fill_pose(detection.pose.pose.position, detection.pose.pose.orientation, pose(np.eye(3), xyz))
     detection.pose.covariance = np.diag([sigma**2] * 3 + [NO_ROTATION] * 3).ravel().tolist()

@@ -44,3 +44,9 @@ def test_a_landmark_is_a_point_with_an_id_above_zero() -> None:
     assert message.pose.covariance[::7] == pytest.approx([0.0004] * 3 + [9999.0] * 3)
     with pytest.raises(ValueError, match="at least 1, got 0"):
         fill_landmark(message, 0, np.zeros(3), sigma=0.02)
+
+
+@pytest.mark.parametrize("sigma", [0.0, -0.1, np.inf, np.nan])
+def test_a_sigma_that_rtabmap_would_replace_by_its_own_is_refused(sigma: float) -> None:
+    with pytest.raises(ValueError, match="sigma above 0 m"):
+        fill_landmark(SimpleNamespace(), 3, np.zeros(3), sigma)
