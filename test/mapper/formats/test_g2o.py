@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_mapper.formats.g2o import edge_text, graph_text, times_file, times_text
-from objreg_ros.geometry import pose_error
+from objreg_ros.geometry import pose, pose_error, rotation_from_vector
 
 from .blank import CONSTRAINT, LOCAL_INFORMATION_DIAGONAL, QUARTER_LEFT
 
@@ -47,6 +47,23 @@ def test_gtsam_reads_the_poses_and_the_information_that_were_written(tmp_path: P
     assert max(pose_error(factor.measured().matrix(), CONSTRAINT.T_from_to)) < 1e-6
     rotation_first = np.roll(LOCAL_INFORMATION_DIAGONAL, 3)
     np.testing.assert_allclose(np.diag(factor.noiseModel().information()), rotation_first, rtol=1e-6)
+
+
+def test_g2o_itself_reads_what_was_written_and_takes_rotations_for_half_as_much(tmp_path: Path) -> None:
+    g2o = pytest.importorskip("g2opy", reason="g2opy is not installed")
+    file = tmp_path / "map.g2o"
+    file.write_text(graph_text([np.eye(4), QUARTER_LEFT], [(0, 1, CONSTRAINT)]))
+    graph = g2o.SparseOptimizer()
+    assert graph.load(str(file))
+    (edge,), vertices = graph.edges(), graph.vertices()
+    assert max(pose_error(np.array(vertices[1].estimate().matrix()), QUARTER_LEFT)) < 1e-6
+    np.testing.assert_allclose(edge.information(), np.diag(LOCAL_INFORMATION_DIAGONAL), atol=1e-9)
+    for k, share in [(0, 1.0), (1, 1.0), (2, 1.0), (3, 0.25), (4, 0.25), (5, 0.25)]:
+        step = 0.01 * np.eye(6)[k]
+        moved = QUARTER_LEFT @ pose(rotation_from_vector(step[3:]), step[:3])
+        vertices[1].set_estimate(g2o.Isometry3d(moved))
+        edge.compute_error()
+        assert edge.chi2() == pytest.approx(share * 1e-4 * LOCAL_INFORMATION_DIAGONAL[k], rel=1e-3)
 
 
 def test_the_times_of_the_vertices_are_whole_nanoseconds_in_a_file_beside_it() -> None:
