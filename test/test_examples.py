@@ -15,9 +15,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from recording.sample_folders import tum_folder
 
+from objreg_mapper.formats.tum import trajectory_text
 from objreg_ros.data.images import Intrinsics
-from objreg_ros.geometry import back_project
+from objreg_ros.geometry import back_project, pose, rotation_from_vector
 from objreg_ros.registration.gate.kinds import KINDS
 from objreg_tools.report.exports.ply import write_ply
 from objreg_tools.simulation.rendering.render import Rendering, render
@@ -34,6 +36,7 @@ SAYS = {
     "consume_constraints.py": "EDGE_SE3:QUAT 0 1",
     "objreg_to_gtsam.py": "solved: the second camera is at [0.1, 0.0, 0.02] m",
     "solve_g2o.py": "0.500000000 0.000000000 0.000000000 1.000000000",
+    "replica_folder.py": "",
 }
 NEEDS = {
     "ply_pair.py": "open3d",
@@ -88,7 +91,15 @@ def draw_ply(folder: Path) -> list[str]:
     return [*files, *numbers(camera, "fx", "fy", "cx", "cy", "width", "height")]
 
 
-DRAWN = {"png_pair.py": draw_png, "ply_pair.py": draw_ply}
+def draw_recording(folder: Path) -> list[str]:
+    """What `replica_folder.py` is called with: a recording of three frames, and poses for two of them and for none."""
+    path = [(0, pose(np.eye(3), np.array([1.0, 2.0, 3.0]))), (200_000_000, TURNED), (9_000_000_000, np.eye(4))]
+    (folder / "path.txt").write_text(trajectory_text(path))
+    return [str(tum_folder(folder / "tum")), str(folder / "path.txt"), str(folder / "out")]
+
+
+TURNED = pose(rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])), np.zeros(3))
+DRAWN = {"png_pair.py": draw_png, "ply_pair.py": draw_ply, "replica_folder.py": draw_recording}
 
 
 def skip_without(name: str) -> None:
@@ -121,7 +132,7 @@ def test_an_example_runs_and_says_what_it_found(name: str, tmp_path: Path) -> No
     assert SAYS[name] in run(str(EXAMPLES / name), *words)
 
 
-@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("name", ["png_pair.py", "ply_pair.py"])
 def test_an_example_that_reads_files_says_how_it_is_called_and_what_a_file_lacks(name: str, tmp_path: Path) -> None:
     skip_without(name)
     files = [str(tmp_path / "none")] * (4 if name == "png_pair.py" else 2)
@@ -135,6 +146,25 @@ def test_an_example_that_reads_files_says_how_it_is_called_and_what_a_file_lacks
             check=False,
         )
         assert done.returncode == 1 and expected in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_folder_in_the_layout_of_replica_reads_back_as_nvblox_reads_it(tmp_path: Path) -> None:
+    """Frames are numbered from 0 without gaps, a pose is a line of 4 x 4, a line names one number of the camera."""
+    run(str(EXAMPLES / "replica_folder.py"), *draw_recording(tmp_path))
+    out = tmp_path / "out"
+    T = np.loadtxt(out / "scene/traj.txt").reshape(-1, 4, 4)
+    np.testing.assert_allclose(T, [pose(np.eye(3), np.array([1.0, 2.0, 3.0])), TURNED], atol=1e-8)
+    camera = {}
+    for line in (out / "cam_params.json").read_text().splitlines():
+        known = [name for name in ("w", "h", "fx", "fy", "cx", "cy", "scale") if name in line]
+        assert len(known) <= 1
+        camera |= {name: float(line.split()[-1].rstrip(",")) for name in known}
+    assert camera == {"w": 64, "h": 48, "fx": 50, "fy": 50, "cx": 31.5, "cy": 23.5, "scale": 1000}
+    files = sorted(file.name for file in (out / "scene/results").iterdir())
+    assert files == ["depth000000.png", "depth000001.png", "frame000000.jpg", "frame000001.jpg"]
+    depth = cv2.imread(str(out / "scene/results/depth000001.png"), cv2.IMREAD_UNCHANGED)
+    assert depth.dtype == np.uint16 and np.unique(depth).tolist() == [1200]
+    assert cv2.imread(str(out / "scene/results/frame000001.jpg"))[0, 0] == pytest.approx([20, 0, 200], abs=4)
 
 
 def test_the_notebook_is_one_and_is_small() -> None:
