@@ -19,6 +19,7 @@ from objreg_ros.geometry import (
     inverse,
     mounting,
     pose,
+    quaternion_from_rotation,
     rotate,
     rotation_from_vector,
     transform,
@@ -119,6 +120,15 @@ def test_gtsam_finds_the_wrong_poses_as_far_off_as_the_covariance_says(tmp_path:
         poses.update(1, gtsam.Pose3(T))
         costs.append(graph.error(poses))
     assert 100.0 * np.mean(costs) == pytest.approx(3.0, rel=0.06)
+
+
+def test_ceres_counts_in_the_axes_of_from_and_rotations_the_other_way_round() -> None:
+    """Its pose_graph_3d compares positions in *from*, and takes twice the vector of measured times estimated^-1."""
+    error = np.array([0.01, -0.02, 0.03, 0.004, 0.005, -0.006])
+    estimated = pose(rotation_from_vector(error[3:]) @ T_FROM_TO[:3, :3], T_FROM_TO[:3, 3] + error[:3])
+    turned = quaternion_from_rotation(T_FROM_TO[:3, :3] @ estimated[:3, :3].T)
+    residual = [*(estimated[:3, 3] - T_FROM_TO[:3, 3]), *(2.0 * turned[:3])]
+    np.testing.assert_allclose(residual, [*error[:3], *-error[3:]], atol=1e-6)
 
 
 def test_the_information_is_the_inverse_of_the_covariance_in_the_axes_of_to() -> None:

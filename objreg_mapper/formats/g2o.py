@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""g2o's text: ``VERTEX_SE3:QUAT`` and ``EDGE_SE3:QUAT``, for g2o, GTSAM, Ceres' examples and SE-Sync.
+"""g2o's text: ``VERTEX_SE3:QUAT`` and ``EDGE_SE3:QUAT``, for g2o, GTSAM, RTAB-Map and SE-Sync.
 
 The file has nothing else. A comment or a ``FIX`` ends the reading of Ceres' examples, and SE-Sync takes it for one more
 edge; who solves the graph fixes a vertex. So the times of the vertices are in a file of their own, `times_file`.
 
-The information is of ``[translation, rotation vector]``, as GTSAM, RTAB-Map and Ceres read it. g2o itself takes the
-last three for half the rotation vector and so trusts rotations a quarter as much.
+The information is of ``[translation, rotation vector]`` in the axes of *to*, as GTSAM reads it. g2o itself takes the
+last three for half the rotation vector and so trusts rotations a quarter as much; RTAB-Map does as the one of the two
+that it solves with. Ceres' example reads the file, but weighs by the axes of *from* (docs/conventions.md).
 """
 
 from __future__ import annotations
