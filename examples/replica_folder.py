@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A corrected recording in Replica's layout, which nvblox reads: `replica_folder.py REC path.txt OUT`.
-
-path.txt is of `objreg offline REC --tum path.txt`; OUT/scene is the scene.
-"""
+"""A recording in Replica's layout along path.txt of `--tum`, for nvblox: `replica_folder.py REC path.txt OUT`."""
 
 import json
 import sys
@@ -11,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from objreg_ros.geometry import mounting
+from objreg_ros.geometry import pose, rotation_from_quaternion
 from objreg_tools.recording import open_recording
 from objreg_tools.recording.inputs import choose_inputs
 from objreg_tools.report.run.pictures import Album
@@ -21,17 +18,20 @@ MM = 1000
 
 def main(recording: str, path: str, out: str) -> None:
     """Write colour, registered depth and `T_map_camera` of each pose that has pictures, and the camera."""
-    scene, poses = Path(out, "scene"), []
+    scene, poses = Path(out, "scene"), list[np.ndarray]()
     (scene / "results").mkdir(parents=True)
     with open_recording(recording) as source:
         album = Album(source, choose_inputs(source.topics))
         for stamp, *numbers in map(str.split, Path(path).read_text(encoding="utf-8").splitlines()):
-            if (seen := album.at(int(stamp.replace(".", "")))) is None:  # ns; a float does not hold those of a date
+            if (seen := album.at(int(stamp.replace(".", "")))) is None or seen.rgb is None:  # ns, which no float holds
                 continue
             cv2.imwrite(str(scene / f"results/frame{len(poses):06d}.jpg"), seen.rgb[..., ::-1])
             cv2.imwrite(str(scene / f"results/depth{len(poses):06d}.png"), (MM * seen.depth).round().astype(np.uint16))
-            poses.append(mounting([float(number) for number in numbers]).ravel())
+            xyz, xyzw = np.split(np.array(numbers, float), [3])
+            poses.append(pose(rotation_from_quaternion(xyzw), xyz).ravel())
             c = seen.intrinsics
+    if not poses:
+        raise SystemExit(f"{path}: expected stamps of pictures of {recording}, got none")
     camera = {"w": c.width, "h": c.height, "fx": c.fx, "fy": c.fy, "cx": c.cx, "cy": c.cy, "scale": MM}
     Path(out, "cam_params.json").write_text(json.dumps({"camera": camera}, indent=1), encoding="utf-8")
     np.savetxt(scene / "traj.txt", poses)

@@ -167,6 +167,13 @@ def test_a_folder_in_the_layout_of_replica_reads_back_as_nvblox_reads_it(tmp_pat
     assert cv2.imread(str(out / "scene/results/frame000001.jpg"))[0, 0] == pytest.approx([20, 0, 200], abs=4)
 
 
+def test_a_path_without_a_picture_of_the_recording_is_refused(tmp_path: Path) -> None:
+    words = draw_recording(tmp_path)
+    (tmp_path / "path.txt").write_text(trajectory_text([(9_000_000_000, np.eye(4))]))
+    with pytest.raises(AssertionError, match="expected stamps of pictures"):
+        run(str(EXAMPLES / "replica_folder.py"), *words)
+
+
 def test_the_notebook_is_one_and_is_small() -> None:
     path = EXAMPLES / "registration.ipynb"
     assert path.stat().st_size < MOST_BYTES
