@@ -40,12 +40,17 @@ def agreements(pair: Pair, poses: Array, others: Array) -> Sequence[KeypointAgre
     return found
 
 
-def _count(matches: KeypointMatches, T_target_source: Array) -> tuple[int, int]:
-    """How many matches agree with a pose, and in how many cells."""
+def agreeing(matches: KeypointMatches, T_target_source: Array) -> Array:
+    """Which matches (M,) bool a pose brings together, by the depth of either end or of both."""
     forth = _errors(matches, T_target_source)
     back = _errors(matches.turned(), inverse(T_target_source))
-    errors = np.fmax(forth, back)
-    a, b = (index[errors < REPROJECTION_PX] for index in (matches.a, matches.b))
+    return np.asarray(np.fmax(forth, back) < REPROJECTION_PX)
+
+
+def _count(matches: KeypointMatches, T_target_source: Array) -> tuple[int, int]:
+    """How many matches agree with a pose, and in how many cells."""
+    agree = agreeing(matches, T_target_source)
+    a, b = matches.a[agree], matches.b[agree]
     return len(a), min(_cells(matches.source, a), _cells(matches.target, b))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
 from objreg_ros.registration.prepare.keypoints import KeypointMatches, Keypoints
-from objreg_ros.registration.score.keypoint_agreement import LEAST_KEYPOINTS, agreements
+from objreg_ros.registration.score.keypoint_agreement import LEAST_KEYPOINTS, agreeing, agreements
 
 FOCAL_PX = 131.25
 T_TRUE = pose(rotation_from_vector(np.array([0.0, np.radians(10.0), 0.0])), np.array([0.3, 0.0, 0.1]))
@@ -46,6 +46,14 @@ def spread(count: int = 40, seed: int = 0) -> np.ndarray:
 def test_all_matches_agree_with_the_true_pose_if_either_end_has_depth(measured: tuple[bool, bool]) -> None:
     (found,) = agreements(matched(spread(), measured=measured), T_TRUE[None], NONE)
     assert found is not None and found.matches == 40 and 15 < found.cells <= 40 and found.rival_matches == 0
+
+
+def test_single_matches_agree_with_a_pose_or_not() -> None:
+    matches = matched(spread()).keypoint_matches
+    source, target, a, b = matches
+    crossed = KeypointMatches(source, target, a, np.concatenate([b[:30], b[30:][::-1]]))
+    assert agreeing(matches, T_TRUE).all() and not agreeing(matches, np.eye(4)).any()
+    assert agreeing(crossed, T_TRUE)[:30].all() and not agreeing(crossed, T_TRUE)[30:].any()
 
 
 def test_matches_without_any_depth_agree_with_nothing() -> None:
