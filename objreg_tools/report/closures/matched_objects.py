@@ -19,7 +19,7 @@ from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.data.frames import UNNAMED
 from objreg_ros.data.images import DepthImage, Intrinsics
 from objreg_ros.geometry import inverse, transform
-from objreg_tools.offline.outlines import UNITS
+from objreg_tools.offline.outlines import UNITS, outline
 from objreg_tools.report.run.pairs import PairRow
 from objreg_tools.report.run.rows import Glimpse
 
@@ -86,6 +86,11 @@ def seen_in(glimpse: Glimpse | None) -> list[Seen]:
     return [Seen(label, xyz, _corners(text)) for (label, xyz), text in zip(glimpse.objects, outlines, strict=True)]
 
 
+def seen_object(label: str, xyz: Array, camera: Intrinsics) -> Seen:
+    """An object in a picture by its points (M, 3) m."""
+    return Seen(label, np.median(xyz, axis=0).astype(float), _corners(outline(xyz, camera)))
+
+
 def matches_of(outcome: LoopClosure | Rejected, first: Sequence[Seen], second: Sequence[Seen]) -> list[Match]:
     """Which objects of both frames a pair laid on each other, those of a constraint by its labels; then what moved.
 
@@ -113,6 +118,22 @@ def drawing(
     """What is drawn over the two pictures of a pair; nothing where nothing is known of their objects."""
     sides = seen_in(glimpses[0]), seen_in(glimpses[1])
     matches = matches_of(outcome, *sides)
+    marks = marks_of(sides, matches, cameras, outcome.T_from_to)
+    shown = {match.label for match in matches}
+    lacking = () if isinstance(outcome, Rejected) else tuple(dict.fromkeys(outcome.labels))
+    return Drawn(marks, max(map(height, cameras)), tuple(name for name in lacking if name not in shown))
+
+
+def marks_of(
+    sides: tuple[Sequence[Seen], Sequence[Seen]],
+    matches: Sequence[Match],
+    cameras: tuple[Intrinsics, Intrinsics],
+    T_from_to: Array | None,
+) -> str:
+    """The objects of two pictures as SVG over both, the ``matches`` among them in a colour each.
+
+    ``T_from_to (4, 4)`` says where a match is that one picture lacks; None where there is no such match.
+    """
     matched = {id(end) for match in matches for end in (match.first, match.second)}
     shapes = [
         shape
@@ -121,12 +142,9 @@ def drawing(
         if id(one) not in matched
         for shape in _object(one, camera, side, "other", "" if one.label == UNNAMED else one.label)
     ]
-    shapes += [shape for k, match in enumerate(matches) for shape in _match(match, k, outcome, cameras)]
+    shapes += [shape for k, match in enumerate(matches) for shape in _match(match, k, T_from_to, cameras)]
     names = _apart_from_each_other([shape for shape in shapes if isinstance(shape, Name)])
-    marks = [shape for shape in shapes if isinstance(shape, str)] + [name.svg for name in names]
-    shown = {match.label for match in matches}
-    lacking = () if isinstance(outcome, Rejected) else tuple(dict.fromkeys(outcome.labels))
-    return Drawn("".join(marks), max(map(height, cameras)), tuple(name for name in lacking if name not in shown))
+    return "".join([*(shape for shape in shapes if isinstance(shape, str)), *(name.svg for name in names)])
 
 
 def pair_drawing(pair: PairRow, first: DepthImage, second: DepthImage) -> Drawn:
@@ -199,14 +217,14 @@ def _moved(closure: LoopClosure, left: Sequence[Seen], right: Sequence[Seen]) ->
 
 
 def _match(
-    match: Match, number: int, outcome: LoopClosure | Rejected, cameras: tuple[Intrinsics, Intrinsics]
+    match: Match, number: int, T_from_to: Array | None, cameras: tuple[Intrinsics, Intrinsics]
 ) -> list[str | Name]:
     """Both ends of a match and the line between them."""
     style = f"m{number % COLOURS}" + (" moved" if match.moved_m else "")
     name = f"{match.label}, moved {match.moved_m:.2f} m" if match.moved_m else match.label
     ends, shapes = list[tuple[float, float]](), list[str | Name]()
     for side, one in enumerate((match.first, match.second)):
-        shown = one or _by_pose(match, outcome)
+        shown = one or _by_pose(match, T_from_to)
         at = _middle(shown, cameras[side], side)
         if at is not None:
             ends.append(at)
@@ -217,11 +235,11 @@ def _match(
     return shapes
 
 
-def _by_pose(match: Match, outcome: LoopClosure | Rejected) -> Seen:
+def _by_pose(match: Match, T_from_to: Array | None) -> Seen:
     """Where the pose puts an object in the picture that does not show it."""
     one = match.first or match.second
-    assert one is not None and outcome.T_from_to is not None
-    T = inverse(outcome.T_from_to) if match.second is None else outcome.T_from_to
+    assert one is not None and T_from_to is not None
+    T = inverse(T_from_to) if match.second is None else T_from_to
     return Seen(one.label, transform(T, one.xyz), np.zeros((0, 2)))
 
 

@@ -12,7 +12,7 @@ import pytest
 from objreg_ros.data.closures import LoopClosure, ObjectMatch, Reason, Rejected
 from objreg_ros.data.images import Intrinsics
 from objreg_ros.geometry import inverse, pose, transform
-from objreg_tools.report.closures.matched_objects import drawing, matches_of, seen_in
+from objreg_tools.report.closures.matched_objects import Match, drawing, marks_of, matches_of, seen_in, seen_object
 from objreg_tools.report.run.rows import Glimpse
 
 CAMERA = Intrinsics(fx=500.0, fy=500.0, cx=319.5, cy=239.5, width=640, height=480)
@@ -89,6 +89,15 @@ def test_objects_without_outlines_have_circles() -> None:
     bare = [frame(list(one.objects), outlines=False) for one in (FIRST, SECOND)]
     marks = drawing(closure("cup"), (bare[0], bare[1]), (CAMERA, CAMERA)).marks
     assert marks.count('<circle class="mark m0"') == 2 and "polygon" not in marks
+
+
+def test_an_object_of_points_has_the_outline_of_its_points() -> None:
+    corners = np.array([[-0.3, -0.3, 2.0], [0.3, -0.3, 2.0], [0.3, 0.3, 2.0], [-0.3, 0.3, 2.0], [0.0, 0.0, 2.0]])
+    one = seen_object("box", corners, CAMERA)
+    expected = [(319.5 + 500.0 * x / 2.0) / 2 for x in (-0.3, 0.3)]
+    assert np.unique(one.outline[:, 0]) == pytest.approx(expected, abs=0.5)
+    marks = marks_of(([one], [one]), [Match("box", one, one)], (CAMERA, CAMERA), None)
+    assert marks.count('<polygon class="mark m0"') == 2 and marks.count('<line class="mark m0"') == 1
 
 
 def test_what_moved_is_tied_by_a_line_and_says_how_far() -> None:
