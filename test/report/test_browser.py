@@ -104,6 +104,21 @@ def test_enter_on_a_row_opens_its_own_pair_and_escape_closes_it(browser: Any) ->
         assert pane(browser) == {} and browser.switch_to.active_element == row
 
 
+def test_the_lines_between_features_are_switched_with_the_keyboard_and_are_absent_without_a_pose(browser: Any) -> None:
+    click(browser, "tr[data-pair=c4]")
+    shown = "return getComputedStyle(document.querySelector('dialog[open] g.agree')).display !== 'none'"
+    browser.execute_script("document.querySelector('dialog[open] [data-lines=agree]').focus()")
+    seen = [browser.execute_script(shown)]
+    for _ in range(2):
+        browser.switch_to.active_element.send_keys(" ")
+        seen.append(browser.execute_script(shown))
+    assert seen == [True, False, True] and "matched features agree with the pose" in pane(browser)["text"]
+    click(browser, "dialog[open] .close")
+    click(browser, "tr[data-pair=r1]")
+    assert "matched features" not in pane(browser)["text"]
+    click(browser, "dialog[open] .close")
+
+
 def test_a_closure_in_the_drawing_opens_its_pair(browser: Any) -> None:
     click(browser, "article.run svg .hit[data-pair=c2]")
     assert pane(browser)["space"] == "c2"

@@ -17,7 +17,7 @@ from objreg_tools.truth import Truth
 
 from .runs import TRUTH, closure, summary, with_a_stray
 
-VOID = {"meta", "img", "br"}
+VOID = {"meta", "img", "br", "input"}
 
 
 class Balance(HTMLParser):

@@ -10,20 +10,19 @@ import cv2
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.images import DepthImage, Detections
-from objreg_ros.geometry import transform
+from objreg_ros.data.images import DepthImage, Detections, Intrinsics
+from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.prepare.keypoints import KeypointMatches
+from objreg_ros.registration.score.keypoint_agreement import agreeing
+from objreg_tools.report.closures.matched_features import counted, ends_of, lines_as_svg, spread
+from objreg_tools.report.closures.matched_objects import Match, height, marks_of, seen_object
 from objreg_tools.report.live_pictures import sight
 from objreg_tools.report.page import environment
 from objreg_tools.report.pair.registered_pair import RegisteredPair
-from objreg_tools.report.run.pictures import WIDTH, data_uri, overlay, picture_uri
+from objreg_tools.report.run.pictures import WIDTH, data_uri, overlay
 from objreg_tools.report.run.reasons import MEANINGS
 from objreg_tools.report.words import reading
-
-SCALE = 2  # times `WIDTH`, of the picture of matches
-AGREES_PX = 6.0  # of the first picture at `WIDTH`, within which a pose brings two matched keypoints together
-AGREEING, OTHER = (46, 204, 64), (150, 150, 150)  # RGB
 
 
 class Seen(NamedTuple):
@@ -45,9 +44,8 @@ def pair_page(name: str, summary: Mapping[str, Any], found: RegisteredPair, seen
     if first is not None and second is not None and found.candidate is not None:
         laid = overlay(first.image, second.image, found.candidate.T_target_source)
         pictures.append((data_uri(laid), "B laid over A by the best pose: grey is agreement"))
-    if first is not None and second is not None and found.matches is not None:
-        T = None if found.candidate is None else found.candidate.T_target_source
-        matches = _matches(first.image, second.image, found.matches, T)
+    if first is not None and second is not None:
+        matches = _matches(first.image, second.image, found)
     meaning = "" if summary["accepted"] else MEANINGS.get(summary["reason"], "")
     template = environment().get_template("pair.html.j2")
     return template.render(
@@ -73,38 +71,44 @@ def _picture(seen: Seen, keyframe: Keyframe) -> str:
     return data_uri(sight(small, camera, boxes, [item.cloud for item in keyframe.objects]))
 
 
-def _matches(first: DepthImage, second: DepthImage, matches: KeypointMatches, T_1_2: Array | None) -> dict[str, Any]:
-    """Both pictures side by side with a line a match, and how many agree with the pose."""
-    small = [_small(image) for image in (first, second)]
-    drawn = np.ascontiguousarray(np.hstack(small))
-    uv_1 = _pixels(first, matches.target.rays[matches.b])
-    uv_2 = _pixels(second, matches.source.rays[matches.a])
-    agree = _agree(first, matches, uv_1, T_1_2)
-    shift = np.array([small[0].shape[1], 0])
-    for k in sorted(range(len(matches)), key=lambda k: bool(agree[k])):
-        ends = (tuple(map(int, point)) for point in (uv_1[k], uv_2[k] + shift))
-        cv2.line(drawn, *ends, AGREEING if agree[k] else OTHER, 1, cv2.LINE_AA)
-    return {"picture": picture_uri(drawn), "count": len(matches), "agreeing": int(agree.sum())}
+def _matches(first: DepthImage, second: DepthImage, found: RegisteredPair) -> dict[str, Any]:
+    """Both pictures and, as SVG over them, the objects and the keypoints that were matched."""
+    assert first.rgb is not None and second.rgb is not None  # an album gives no picture without colour
+    cameras = first.intrinsics, second.intrinsics
+    return {
+        "pictures": [data_uri(first.rgb), data_uri(second.rgb)],
+        "height": max(map(height, cameras)),
+        "objects": _objects(found, cameras),
+        "lines": [] if found.matches is None else _lines(found.matches, cameras, found.candidate),
+    }
 
 
-def _small(image: DepthImage) -> Array:
-    assert image.rgb is not None  # an album gives no picture without colour
-    width = SCALE * WIDTH // 2
-    size = width, round(image.rgb.shape[0] * width / image.rgb.shape[1])
-    return np.asarray(cv2.resize(np.ascontiguousarray(image.rgb), size, interpolation=cv2.INTER_AREA))
+def _lines(
+    matches: KeypointMatches, cameras: tuple[Intrinsics, Intrinsics], best: Candidate | None
+) -> list[dict[str, Any]]:
+    """The matched keypoints by whether they agree with the pose, each kind with its switch; of one kind without one."""
+    ends = ends_of(matches, cameras)
+    if best is None:
+        return [_kind("disagree", "features", f"{len(ends)} features match; there is no pose", ends, is_on=True)]
+    agree = agreeing(matches, best.T_target_source)
+    chosen = {verb: ends[of_kind] for verb, of_kind in (("agree", agree), ("disagree", ~agree))}
+    counts = {verb: counted(len(some), len(ends), verb) for verb, some in chosen.items()}
+    return [
+        _kind("agree", "features", counts["agree"], chosen["agree"], is_on=True),
+        _kind("disagree", "those that disagree", counts["disagree"], chosen["disagree"], is_on=False),
+    ]
 
 
-def _pixels(image: DepthImage, rays: Array) -> Array:
-    """Pixels (N, 2) of lines of sight, in the picture as `_small` makes it."""
-    camera, scale = image.intrinsics, SCALE * WIDTH / 2 / image.intrinsics.width
-    return (rays * (camera.fx, camera.fy) + (camera.cx, camera.cy)) * scale
+def _kind(style: str, label: str, text: str, ends: Array, is_on: bool) -> dict[str, Any]:
+    return {"style": style, "label": label, "text": text, "svg": lines_as_svg(ends[spread(ends)]), "is_on": is_on}
 
 
-def _agree(first: DepthImage, matches: KeypointMatches, uv_1: Array, T_1_2: Array | None) -> Array:
-    """(N,) bool: which matches a pose brings together in the first picture."""
-    if T_1_2 is None or len(matches) == 0:
-        return np.zeros(len(matches), bool)
-    xyz = transform(T_1_2, matches.source.xyz[matches.a])
-    ahead = matches.source.measured[matches.a] & (xyz[:, 2] > 0.1)
-    rays = xyz[:, :2] / np.where(ahead, xyz[:, 2], 1.0)[:, None]
-    return np.asarray(ahead & (np.linalg.norm(_pixels(first, rays) - uv_1, axis=1) < AGREES_PX))
+def _objects(found: RegisteredPair, cameras: tuple[Intrinsics, Intrinsics]) -> str:
+    """The objects of both frames as SVG, those that the pose lays on each other in a colour each."""
+    first, second = (
+        [seen_object(item.label, item.cloud.xyz, camera) for item in keyframe.objects]
+        for keyframe, camera in zip((found.first, found.second), cameras, strict=True)
+    )
+    pairs = () if found.candidate is None else found.candidate.matched
+    matches = [Match(pair.label, first[pair.target], second[pair.source]) for pair in pairs]
+    return marks_of((first, second), matches, cameras, None)

@@ -255,7 +255,7 @@ def _browser(pairs: Sequence[PairRow], drawn: Thumbnails, album: Album | None) -
         "false": sum(pair.verdict == "false" for pair in pairs),
         "lacking": _lacking(drawn, len(pairs)) if album is not None else "There are no pictures of this run.",
         "data": {
-            "pairs": {pair.key: _pane(pair, drawn.drawings.get(pair.key)) for pair in pairs},
+            "pairs": {pair.key: _pane(pair, drawn) for pair in pairs},
             "kinds": {name: [kind.text, kind.limit] for name, kind in EVIDENCE.items()},
             "moments": {str(stamp_ns): uri for stamp_ns, uri in drawn.moments.items()},
             "overlays": drawn.overlays,
@@ -285,11 +285,13 @@ def _row(pair: PairRow) -> View:
     }
 
 
-def _pane(pair: PairRow, drawn: Drawn | None) -> View:
+def _pane(pair: PairRow, thumbs: Thumbnails) -> View:
     """The text of the pane beside the pictures of a pair, what is drawn over these, and the evidence."""
     evidence = weighed(pair.outcome.evidence, pair.run.least_odds)
+    drawn, features = thumbs.drawings.get(pair.key), thumbs.features.get(pair.key)
     return {
         "marks": drawn[:2] if drawn is not None and drawn.marks else None,
+        "features": None if features is None else [features.text, features.ends.ravel().tolist()],
         "lacking": _not_shown(drawn),
         "from": str(pair.outcome.from_ns),
         "to": str(pair.outcome.to_ns),

@@ -105,6 +105,20 @@ function browse(article) {
     part(".verdict-of").textContent = pair.total === null ? "" : oddsText(pair);
   }
 
+  // Thin lines between matched features, four numbers a line; no switch where there is no pose.
+  function drawFeatures(features, svg) {
+    part(".features").hidden = !features;
+    const [text, ends] = features || ["", []];
+    part(".counted").textContent = text;
+    const lines = [];
+    for (let k = 0; k < ends.length; k += 4) {
+      const [x1, y1, x2, y2] = ends.slice(k, k + 4);
+      lines.push(`<line x1="${x1}" y1="${y1}" x2="${x2}" y2="${y2}"/>`);
+      lines.push(`<circle cx="${x1}" cy="${y1}" r="2"/><circle cx="${x2}" cy="${y2}" r="2"/>`);
+    }
+    svg.insertAdjacentHTML("afterbegin", `<g class="agree">${lines.join("")}</g>`);
+  }
+
   function drawEnds(pair, seconds) {
     const figure = part(".ends"), svg = figure.querySelector("svg");
     const known = [data.moments[pair.from], pair.from === pair.to ? "" : data.moments[pair.to]];
@@ -117,6 +131,7 @@ function browse(article) {
     const [marks, height] = pair.marks || ["", 240];
     svg.setAttribute("viewBox", "0 0 648 " + height);
     svg.innerHTML = marks;
+    drawFeatures(pair.features, svg);
     figure.querySelector("figcaption").textContent = (pair.from === pair.to ? seconds[0] : seconds.join(" ↔ ")) + (pair.lacking && ". " + pair.lacking);
   }
 

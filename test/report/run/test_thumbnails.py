@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.data.images import DepthImage, Intrinsics
+from objreg_tools.report.closures.matched_features import MOST
 from objreg_tools.report.run.pairs import pairs_of
 from objreg_tools.report.run.run_summary import RunSummary
 from objreg_tools.report.run.thumbnails import thumbnails
@@ -38,6 +39,12 @@ def test_a_moment_of_two_pairs_is_kept_once_and_a_pose_has_its_overlay() -> None
     assert len(drawn.moments) == 9 and list(drawn.overlays) == ["c0", "c1", "c2", "c3"]
     assert all(uri.startswith("data:image/jpeg;base64,") for uri in (*drawn.moments.values(), *drawn.overlays.values()))
     assert drawn.left_out == 0 and not drawn.lacking
+
+
+def test_a_pair_with_a_pose_has_the_features_that_it_brings_together() -> None:
+    drawn = thumbnails(PAIRS, Wall())
+    assert drawn.features.keys() == drawn.overlays.keys()
+    assert all(one.ends.shape == (min(one.agreeing, MOST), 4) for one in drawn.features.values())
 
 
 def test_what_has_no_picture_is_counted_by_why() -> None:
