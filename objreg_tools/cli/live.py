@@ -104,10 +104,11 @@ def _listening(environment: Mapping[str, str]) -> Iterator[Collector]:
     from rclpy.context import Context
 
     from objreg_ros.bridge.streams.collector import Collector
+    from objreg_tools.offline.outlines import outline
 
     context = Context()
     context.init(args=[])  # not the command line: its --remap is not for ROS
-    collector = Collector(context)
+    collector = Collector(context, outline)
     try:
         yield collector
     finally:

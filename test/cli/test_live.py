@@ -117,7 +117,7 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Stage:
     made.events = [(1.0, made.reports(**dict.fromkeys(STAGES, counters(0)))), (1.0, made.ends)]
     monkeypatch.setattr("objreg_tools.cli.live.Processes", made.processes)
     monkeypatch.setattr("rclpy.context.Context", lambda: made)
-    monkeypatch.setattr("objreg_ros.bridge.streams.collector.Collector", lambda context: made)
+    monkeypatch.setattr("objreg_ros.bridge.streams.collector.Collector", lambda context, outline: made)
     monkeypatch.setattr("os.environ", {"HOME": "/home/me"})
     return made
 

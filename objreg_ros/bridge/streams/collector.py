@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,19 +15,23 @@ from nav_msgs.msg import Odometry
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge.messages import from_msg, headers
+from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import REJECTED, accepted_of, balance_of, refusal_of
+from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure, Rejected
 from objreg_ros.data.frames import ObjectCloud
-from objreg_ros.data.images import Detections
+from objreg_ros.data.images import Detections, Intrinsics
 
-RECENT = 100  # detections that wait for their objects
+RECENT = 100  # detections that wait for their objects, objects for their camera, and cameras for theirs
+
+Outline = Callable[[Array, Intrinsics], str]
+"""What is kept of the points (M, 3) m of an object in the picture of a camera."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +43,9 @@ class LastDetections:
 
 
 class Collector(Node):
-    """Collects while `spin_until` runs."""
+    """Collects while `spin_until` runs; glimpses have an ``outline`` of each object where that is given."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, outline: Outline | None = None) -> None:
         super().__init__("collector", context=context)
         self.counters: dict[str, Balance] = {}
         self.rejected: dict[str, int] = {}
@@ -49,8 +53,11 @@ class Collector(Node):
         self._accepted: dict[tuple[int, int], dict[str, Any]] = {}  # stamps of a constraint → fields it does not carry
         self.refusals: list[Rejected] = []
         self.sight: LastDetections | None = None
-        self.glimpses: dict[int, dict[str, Any]] = {}  # stamp → labels detected, middles of objects
+        self.glimpses: dict[int, dict[str, Any]] = {}  # stamp → labels detected, middles and outlines of objects
         self._names: Mapping[int, str] = {}
+        self._outline = outline
+        self._waiting: dict[int, Sequence[ObjectCloud]] = {}  # stamp → objects whose camera has not come yet
+        self._cameras: dict[int, Intrinsics] = {}  # stamp → camera whose objects have not come yet
         self._recent: deque[Detections] = deque(maxlen=RECENT)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self)
@@ -64,6 +71,8 @@ class Collector(Node):
         self.create_subscription(String, "labels", self._on_labels, qos.latched())
         self.create_subscription(PointCloud2, "detections_table", self._on_detections, qos.stage())
         self.create_subscription(PointCloud2, "objects", self._on_objects, qos.stage())
+        if self._outline is not None:
+            self.create_subscription(CameraInfo, "view/camera_info", self._on_camera, qos.stage())
 
     @property
     def closures(self) -> list[LoopClosure]:
@@ -122,11 +131,34 @@ class Collector(Node):
         objects, _ = from_msg.objects(message, self._names)
         middles = [[item.label, np.median(item.xyz, axis=0).astype(float).round(4).tolist()] for item in objects]
         self._glimpse(stamp_ns)["objects"] = middles
+        self._glimpse(stamp_ns).pop("outlines", None)  # of an earlier frame of this stamp, where a bag is looped
+        if self._outline is not None:
+            _keep(self._waiting, stamp_ns, objects)
+            self._draw(stamp_ns)
         if not self._recent:
             return
         if self.sight is None or len(objects) >= len(self.sight.objects):
             seen = min(self._recent, key=lambda detections: abs(detections.stamp_ns - stamp_ns))
             self.sight = LastDetections(seen, objects)
 
+    def _on_camera(self, message: Any) -> None:
+        stamp_ns = headers.stamp_ns(message)
+        _keep(self._cameras, stamp_ns, camera_from_msg.intrinsics(message))
+        self._draw(stamp_ns)
+
+    def _draw(self, stamp_ns: int) -> None:
+        """The outlines of a frame, once its objects and its camera are there: they come in any order."""
+        if self._outline is None or stamp_ns not in self._waiting or stamp_ns not in self._cameras:
+            return
+        objects, camera = self._waiting.pop(stamp_ns), self._cameras.pop(stamp_ns)
+        self._glimpse(stamp_ns)["outlines"] = [self._outline(item.xyz, camera) for item in objects]
+
     def _glimpse(self, stamp_ns: int) -> dict[str, Any]:
         return self.glimpses.setdefault(stamp_ns, {"stamp_ns": stamp_ns, "labels": [], "objects": []})
+
+
+def _keep(items: dict[int, Any], stamp_ns: int, item: Any) -> None:
+    """Keep an item by its stamp, and the `RECENT` last ones only."""
+    items[stamp_ns] = item
+    if len(items) > RECENT:
+        del items[next(iter(items))]

@@ -33,12 +33,12 @@ REGISTRAR = RegistrarDiagnostics(
 BOOKS = Balance(10, 6, 1, {"overtaken": 3}, {"image": 2}, {"total": (10.0, 20.0)})
 
 
-@pytest.fixture
-def collector(monkeypatch: pytest.MonkeyPatch) -> Iterator[Collector]:
+@pytest.fixture(params=[None])
+def collector(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Iterator[Collector]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = Context()
     context.init(args=[])
-    made = Collector(context)
+    made = Collector(context, request.param)
     yield made
     made.close()
     context.try_shutdown()
@@ -60,7 +60,7 @@ def detections(stamp_ns: int, *labels: str) -> Any:
     return to_msg.detections_table(word, NAMES)
 
 
-def objects(stamp_ns: int, *labels: str) -> Any:
+def frame(stamp_ns: int, *labels: str) -> Frame:
     """A frame of objects; the k-th has its points about (k, 0, 2) and one stray."""
     clouds = []
     for k, label in enumerate(labels, start=1):
@@ -75,11 +75,23 @@ def objects(stamp_ns: int, *labels: str) -> Any:
         xyz=np.ones((6, 8, 3), np.float32), grey=None,
         intrinsics=Intrinsics(fx=5.0, fy=5.0, cx=3.5, cy=2.5, width=8, height=6),
     )  # fmt: skip
-    frame = Frame(
+    return Frame(
         objects=tuple(clouds), support=None, view=view, gravity=None, gravity_confidence=0.0, T_odom_camera=None,
         stamp_ns=stamp_ns,
     )  # fmt: skip
-    return to_msg.objects(frame, NAMES)
+
+
+def objects(stamp_ns: int, *labels: str) -> Any:
+    return to_msg.objects(frame(stamp_ns, *labels), NAMES)
+
+
+def camera(stamp_ns: int) -> Any:
+    return to_msg.view_camera_info(frame(stamp_ns))
+
+
+def span(xyz: np.ndarray, intrinsics: Intrinsics) -> str:
+    """Stands in for an outline: how many points, and how wide the picture is."""
+    return f"{len(xyz)} of {intrinsics.width}"
 
 
 def status(node: str, *own: Diagnostics, balance: Balance = BOOKS) -> DiagnosticArray:
@@ -125,6 +137,27 @@ def test_a_glimpse_holds_what_was_detected_and_where_the_objects_were(collector:
         5: {"stamp_ns": 5, "labels": ["tv", "cup"], "objects": [["cup", [1.0, 0.0, 2.0]], ["tv", [2.0, 0.0, 2.0]]]},
         6: {"stamp_ns": 6, "labels": [], "objects": []},
     }
+
+
+@pytest.mark.parametrize("collector", [span], indirect=True)
+def test_objects_get_their_outlines_whether_they_or_their_camera_come_first(collector: Collector) -> None:
+    receive(collector, "/objects", objects(5, "cup", "tv"))
+    assert "outlines" not in collector.glimpses[5]
+    receive(collector, "/view/camera_info", camera(6))
+    receive(collector, "/view/camera_info", camera(5))
+    receive(collector, "/objects", objects(6, "cup"))
+    assert [collector.glimpses[k]["outlines"] for k in (5, 6)] == [["5 of 8", "5 of 8"], ["5 of 8"]]
+    receive(collector, "/objects", objects(5))
+    assert "outlines" not in collector.glimpses[5], "those of other objects of the same stamp"
+
+
+@pytest.mark.parametrize("collector", [span], indirect=True)
+def test_no_more_objects_wait_for_their_camera_than_are_recent(collector: Collector) -> None:
+    for stamp_ns in range(collector_module.RECENT + 1):
+        receive(collector, "/objects", objects(stamp_ns, "cup"))
+    for stamp_ns in (0, 1):
+        receive(collector, "/view/camera_info", camera(stamp_ns))
+    assert "outlines" not in collector.glimpses[0] and collector.glimpses[1]["outlines"] == ["5 of 8"]
 
 
 def test_before_the_labels_come_classes_are_called_by_their_numbers(collector: Collector) -> None:
