@@ -16,6 +16,7 @@ from objreg_ros.data.images import Detections
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registration.gate.likelihood import BEFORE
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.whole_file import write_whole
@@ -37,6 +38,7 @@ from objreg_tools.cli.settings import print_ignored
 from objreg_tools.cli.verbosity import aside
 from objreg_tools.offline.stages import Stages
 from objreg_tools.rehearsal import SeesNothing
+from objreg_tools.report.closures.weighed_evidence import EVIDENCE, with_unit
 from objreg_tools.report.pair.pair_page import Seen, pair_page
 from objreg_tools.report.pair.registered_pair import RegisteredPair, register_pair
 from objreg_tools.report.run.pictures import Album
@@ -178,8 +180,10 @@ def candidate_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 def _say_odds(odds: Mapping[str, Any] | None) -> None:
     if odds is None:
         return
-    lines = [(term["phrase"], reading(term["reading"]), f"{term['weight']:+.2f}") for term in odds["terms"]]
+    lines = [
+        (term["phrase"], with_unit(term["kind"], term["reading"]), f"{term['weight']:+.2f}") for term in odds["terms"]
+    ]
     total = ("sum: odds", reading(odds["odds"]), f"{odds['sum']:+.2f}")
     asked = ("asked for", f"{odds['least_odds']:g}", f"{odds['least']:+.2f}")
-    rows = [("prior", "", f"{odds['prior']:+.2f}"), *lines, total, asked]
+    rows = [(EVIDENCE[BEFORE].text, "", f"{odds['prior']:+.2f}"), *lines, total, asked]
     click.echo(columns(("evidence of the best", "reading", "weight"), rows) + "\n")

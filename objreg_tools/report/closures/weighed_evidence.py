@@ -86,8 +86,8 @@ def weighed(evidence: Mapping[str, float], least_odds: float = ODDS) -> Weighed:
     """The evidence of a constraint or a refusal as its JSON names it; names with spaces are taken, too."""
     known = {name.replace(" ", "_") if _is_published(name) else name: value for name, value in evidence.items()}
     weights = _weights(known)
-    first = [Reading(name, _text(name, known.get(name)), weight) for name, weight in weights.items()]
-    rest = [Reading(name, _text(name, value)) for name, value in known.items() if name not in weights]
+    first = [Reading(name, with_unit(name, known.get(name)), weight) for name, weight in weights.items()]
+    rest = [Reading(name, with_unit(name, value)) for name, value in known.items() if name not in weights]
     return Weighed((*first, *rest), sum(weights.values()) if weights else None, log10(max(least_odds, 1e-9)))
 
 
@@ -103,8 +103,8 @@ def _weights(evidence: Mapping[str, float]) -> dict[str, float]:
     return found if same else {}
 
 
-def _text(key: str, value: float | None) -> str:
-    """A number with its unit; of what was not measured ``not known``."""
+def with_unit(key: str, value: float | None) -> str:
+    """A number of the evidence with its unit; of what was not measured ``not known``."""
     if key == BEFORE:
         return ""
     if value is None:

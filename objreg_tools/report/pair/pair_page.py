@@ -17,6 +17,7 @@ from objreg_ros.registration.prepare.keypoints import KeypointMatches
 from objreg_ros.registration.score.keypoint_agreement import agreeing
 from objreg_tools.report.closures.matched_features import counted, ends_of, lines_as_svg, spread
 from objreg_tools.report.closures.matched_objects import Match, height, marks_of, seen_object
+from objreg_tools.report.closures.weighed_evidence import EVIDENCE, with_unit
 from objreg_tools.report.live_pictures import sight
 from objreg_tools.report.page import environment
 from objreg_tools.report.pair.registered_pair import RegisteredPair
@@ -49,8 +50,9 @@ def pair_page(name: str, summary: Mapping[str, Any], found: RegisteredPair, seen
     meaning = "" if summary["accepted"] else MEANINGS.get(summary["reason"], "")
     template = environment().get_template("pair.html.j2")
     return template.render(
-        name=name, pair=summary, pictures=pictures, matches=matches, meaning=meaning, reading=reading
-    )
+        name=name, pair=summary, pictures=pictures, matches=matches, meaning=meaning,
+        evidence=EVIDENCE, with_unit=with_unit, reading=reading,
+    )  # fmt: skip
 
 
 def _picture(seen: Seen, keyframe: Keyframe) -> str:

@@ -18,7 +18,7 @@ from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose_error, rotation_angle
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
-from objreg_ros.registration.gate.kinds import KINDS, readings_of
+from objreg_ros.registration.gate.kinds import readings_of
 from objreg_ros.registration.gate.likelihood import log_odds, odds_of, weigh
 from objreg_ros.registration.gate.limits import Limits, limits_of
 from objreg_ros.registration.gate.verdict import compared, judge, refuse
@@ -29,6 +29,7 @@ from objreg_ros.registration.prepare.keypoints import KeypointMatches
 from objreg_ros.registration.prepare.prepared import Pair, Prepared
 from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN
 from objreg_ros.registration.propose.shortlist import Shortlist, shortlist
+from objreg_tools.report.closures.weighed_evidence import EVIDENCE
 
 ACCEPTED = "accepted"
 
@@ -163,7 +164,7 @@ def _odds(one: Candidate, limits: Limits) -> dict[str, Any]:
     """The terms of the odds in decimal logarithms: they add up to the ``sum``."""
     readings = readings_of(one)
     terms = [
-        {"kind": name, "phrase": KINDS[name].phrase, "reading": reading, "weight": round(weigh(name, reading), 4)}
+        {"kind": name, "phrase": EVIDENCE[name].text, "reading": reading, "weight": round(weigh(name, reading), 4)}
         for name, reading in readings.items()
     ]
     total = log_odds(readings)

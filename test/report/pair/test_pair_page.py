@@ -7,12 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from registration.rooms import CAMERA, cast, keyframe, seen_from
 
 from objreg_ros.data.images import DepthImage, Detections
+from objreg_ros.registration.gate.kinds import KINDS
+from objreg_ros.registration.gate.likelihood import BEFORE
 from objreg_ros.registration.params import RegistrationParams
 from objreg_ros.registration.score.keypoint_agreement import agreeing
 from objreg_tools.report.closures.matched_features import MOST
+from objreg_tools.report.closures.weighed_evidence import EVIDENCE, with_unit
 from objreg_tools.report.pair.pair_page import Seen, pair_page
 from objreg_tools.report.pair.registered_pair import RegisteredPair, register_pair
 
@@ -45,7 +49,15 @@ def test_a_page_has_both_pictures_the_overlay_and_the_matches(found: RegisteredP
     page = text(found, seen(0.0), seen(20.0))
     assert page.count("data:image/jpeg") == 5 and "http" not in page.replace("http://www.w3.org", "")
     assert "&lt;kitchen&gt;, one pair" in page and NAME not in page
-    assert all(term["phrase"] in page for term in found.summary["odds"]["terms"])
+    assert all(escape(term["phrase"]) in page for term in found.summary["odds"]["terms"])
+
+
+def test_evidence_has_the_names_and_the_units_that_the_page_of_a_run_has(found: RegisteredPair) -> None:
+    page = text(found, seen(0.0), seen(20.0))
+    (rmse,) = (term["reading"] for term in found.summary["odds"]["terms"] if term["kind"] == "rmse")
+    for name in (BEFORE, *KINDS, "score", "inliers", "violations"):
+        assert escape(EVIDENCE[name].text) in page, name
+    assert with_unit("rmse", rmse).endswith("mm") and with_unit("rmse", rmse) in page
 
 
 def test_matches_are_lines_over_both_pictures_with_a_switch_for_those_that_agree_and_one_for_the_rest(
