@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 from functools import cache
+
+from objreg_tools.report.packed import zipped
 
 
 @cache
@@ -15,4 +15,4 @@ def plotly_bundle() -> str:
         from plotly.offline import get_plotlyjs
     except ImportError:
         return ""
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode("ascii")
+    return zipped(get_plotlyjs().encode())

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points as a page carries them: 16 bits a coordinate, in base64."""
+"""Points and texts as a page carries them: 16 bits a coordinate, in base64; some of it zipped."""
 
 from __future__ import annotations
 
 import base64
+import gzip
 from typing import Any
 
 import numpy as np
@@ -24,3 +25,8 @@ def packed(xyz: Array) -> dict[str, Any]:
 def encoded(values: Array) -> str:
     """The bytes of an array, row after row, in base64."""
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def zipped(content: bytes) -> str:
+    """Bytes as gzip in base64, which `unzip.js` unpacks; always the same for the same bytes."""
+    return base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")

@@ -4,17 +4,23 @@
 from __future__ import annotations
 
 import base64
+import gzip
 from typing import Any
 
 import numpy as np
 
-from objreg_tools.report.packed import packed
+from objreg_tools.report.packed import packed, zipped
 
 
 def unpacked(told: dict[str, Any]) -> np.ndarray:
     """As templates/space.js does."""
     steps = np.frombuffer(base64.b64decode(told["xyz"]), "<u2").reshape(3, -1).T
     return np.array(told["low"]) + told["step"] * steps
+
+
+def unzipped(text: str) -> bytes:
+    """As templates/unzip.js does."""
+    return gzip.decompress(base64.b64decode(text))
 
 
 def test_points_come_back_to_half_a_step() -> None:
@@ -27,3 +33,9 @@ def test_points_come_back_to_half_a_step() -> None:
 def test_one_point_and_none_are_packed_too() -> None:
     assert np.array_equal(unpacked(packed(np.array([[1.0, 2.0, 3.0]]))), [[1.0, 2.0, 3.0]])
     assert unpacked(packed(np.zeros((0, 3)))).shape == (0, 3)
+
+
+def test_what_is_zipped_comes_back_and_is_the_same_each_time() -> None:
+    text = "a café " * 1000
+    assert unzipped(zipped(text.encode())).decode() == text
+    assert zipped(text.encode()) == zipped(text.encode()) and len(zipped(text.encode())) < len(text) / 20

@@ -31,7 +31,7 @@ def test_the_recording_of_a_run_gives_truth_and_pictures(tmp_path: Path, shared:
     (tmp_path / "run.json").write_text(json.dumps({**summary(), "recording": str(place)}))
     assert write_report(tmp_path / "out.html", [tmp_path / "run.json"]) == []
     text = (tmp_path / "out.html").read_text()
-    assert "<h1>redkitchen_a</h1>" in text and text.count("data:image/jpeg") >= 12
+    assert "<h1>redkitchen_a</h1>" in text and text.count("data:image/webp") >= 12
 
 
 def test_the_json_of_a_live_run_is_told_by_the_odometry_of_its_recording(tmp_path: Path) -> None:

@@ -5,28 +5,27 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from math import ceil, sqrt
 from typing import Any
 
 import numpy as np
 
-from objreg_ros.data.checked import Array
 from objreg_ros.data.images import DepthImage
-from objreg_ros.geometry import back_project
-from objreg_tools.report.packed import encoded, packed
+from objreg_tools.report.packed import MOST, zipped
 from objreg_tools.report.run.pairs import PairRow, by_interest
 from objreg_tools.report.run.pictures import Album
 
 PAGE_BYTES = 4_000_000  # of all clouds of a page; that of one run has 15 MB for everything
 MOST_POINTS = 64 * 48  # of one cloud
+STEP_M = 0.001  # of depth, where nothing is farther than 65 m
 LEFT_OUT = "left out, as the page would grow too large"
 
 
 @dataclass
 class Clouds:
-    """``moments`` by stamp, in their camera's frame, and ``poses`` by the key of a pair: T_from_to (3, 4), row by row.
+    """``moments`` by stamp, the depth of each, and ``poses`` by the key of a pair: T_from_to (3, 4), row by row.
 
     ``absent`` says of each pair with a pose but without clouds, by its key, why there are none.
     """
@@ -36,7 +35,7 @@ class Clouds:
     absent: dict[str, str] = field(default_factory=dict)
     size: int = 0
 
-    def add_pair(self, pair: PairRow, album: Album, most_bytes: int) -> None:
+    def add_pair(self, pair: PairRow, album: Album, pictured: Container[int], most_bytes: int) -> None:
         """Both clouds of a pair and its pose, or why they are absent."""
         stamps_ns = (pair.outcome.from_ns, pair.outcome.to_ns)
         seen = {stamp_ns: image for stamp_ns in stamps_ns if (image := album.at(stamp_ns)) is not None}
@@ -46,7 +45,7 @@ class Clouds:
             return
         moments = {str(stamp): _cloud(image) for stamp, image in seen.items() if str(stamp) not in self.moments}
         size = len(json.dumps(moments)) if moments else 0
-        if self.size + size > most_bytes:
+        if self.size + size > most_bytes or not all(stamp_ns in pictured for stamp_ns in stamps_ns):
             self.absent[pair.key] = LEFT_OUT
             return
         self.size += size
@@ -62,8 +61,13 @@ class Clouds:
         )
 
 
-def clouds(pairs: Iterable[PairRow], album: Album | None, most_bytes: int = PAGE_BYTES) -> Clouds:
-    """The clouds of the pairs that have a pose: of false constraints first, then of right ones, then of refusals."""
+def clouds(
+    pairs: Iterable[PairRow], album: Album | None, pictured: Container[int], most_bytes: int = PAGE_BYTES
+) -> Clouds:
+    """The clouds of the pairs that have a pose: of false constraints first, then of right ones, then of refusals.
+
+    Their colours are those of the page's pictures: of a moment that is not ``pictured`` there is no cloud.
+    """
     made = Clouds()
     if album is None:
         return made
@@ -73,21 +77,16 @@ def clouds(pairs: Iterable[PairRow], album: Album | None, most_bytes: int = PAGE
         if LEFT_OUT in made.absent.values():
             made.absent[pair.key] = LEFT_OUT
         else:
-            made.add_pair(pair, album, most_bytes)
+            made.add_pair(pair, album, pictured, most_bytes)
     return made
 
 
-def thinned(seen: DepthImage) -> tuple[Array, Array]:
-    """Points (N, 3) in the camera, m, and their colours (N, 3): `MOST_POINTS` at most, on a grid of pixels."""
-    step = ceil(sqrt(max(1.0, seen.depth.size / MOST_POINTS)))
-    while -(-seen.depth.shape[0] // step) * -(-seen.depth.shape[1] // step) > MOST_POINTS:
+def grid_of(shape: tuple[int, ...]) -> int:
+    """How many pixels a point of a cloud is from the next, for `MOST_POINTS` at most of a picture (H, W)."""
+    step = ceil(sqrt(max(1.0, shape[0] * shape[1] / MOST_POINTS)))
+    while -(-shape[0] // step) * -(-shape[1] // step) > MOST_POINTS:
         step += 1
-    rows = slice(step // 2, None, step)
-    depth, camera = seen.depth[rows, rows], seen.intrinsics.scaled(step)
-    measured = depth > 0
-    xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)[measured]
-    colours = np.full((len(xyz), 3), 160, np.uint8) if seen.rgb is None else seen.rgb[rows, rows][measured]
-    return xyz, colours
+    return step
 
 
 def _lacking(seen: DepthImage | None, why: str) -> str:
@@ -98,5 +97,19 @@ def _lacking(seen: DepthImage | None, why: str) -> str:
 
 
 def _cloud(seen: DepthImage) -> dict[str, Any]:
-    xyz, colours = thinned(seen)
-    return {**packed(xyz), "rgb": encoded(colours)}
+    """The depth on a grid of pixels, row by row in uint16 of ``unit`` m, 0 where none was measured, with its camera.
+
+    ``grid`` is what a point is from the next, in pixels, and the width and the height of the picture.
+    """
+    step = grid_of(seen.depth.shape)
+    depth = seen.depth[step // 2 :: step, step // 2 :: step]
+    depth = np.where(depth > 0, depth, 0.0)
+    unit = max(STEP_M, float(depth.max(initial=0.0)) / MOST)
+    camera = seen.intrinsics.scaled(step)
+    return {
+        "depth": zipped(np.rint(depth / unit).astype("<u2").tobytes()),
+        "unit": unit,
+        "columns": depth.shape[1],
+        "camera": [round(value, 4) for value in (camera.fx, camera.fy, camera.cx, camera.cy)],
+        "grid": [step, seen.depth.shape[1], seen.depth.shape[0]],
+    }

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -11,6 +12,7 @@ from typing import Any
 from objreg_ros.data.closures import UNTRIED
 from objreg_tools.report.closures.matched_objects import Drawn, pair_drawing
 from objreg_tools.report.closures.weighed_evidence import EVIDENCE, weighed
+from objreg_tools.report.packed import zipped
 from objreg_tools.report.pair.pair_command import pair_command
 from objreg_tools.report.run import clouds, figures, thumbnails
 from objreg_tools.report.run.camera_map import of_one_clock
@@ -37,7 +39,7 @@ def view_of_run(run: RunSummary, album: Album | None, runs: int = 1, spatial: bo
     tracks = run.tracks()
     pairs = pairs_of(run)
     drawn = thumbnails.thumbnails(pairs, album, thumbnails.PAGE_BYTES // runs)
-    solid = clouds.clouds(pairs, album, clouds.PAGE_BYTES // runs) if spatial else None
+    solid = clouds.clouds(pairs, album, drawn.moments, clouds.PAGE_BYTES // runs) if spatial else None
     return {
         "name": run.name,
         "said": _said(run),
@@ -256,11 +258,18 @@ def _browser(pairs: Sequence[PairRow], drawn: Thumbnails, album: Album | None) -
         "lacking": _lacking(drawn, len(pairs)) if album is not None else "There are no pictures of this run.",
         "data": {
             "pairs": {pair.key: _pane(pair, drawn) for pair in pairs},
+            "marks": _marks(drawn),
             "kinds": {name: [kind.text, kind.limit] for name, kind in EVIDENCE.items()},
             "moments": {str(stamp_ns): uri for stamp_ns, uri in drawn.moments.items()},
             "overlays": drawn.overlays,
         },
     }
+
+
+def _marks(drawn: Thumbnails) -> str:
+    """What is drawn over the pictures of each pair, and their height, zipped."""
+    marks = {key: one[:2] for key, one in drawn.drawings.items() if one.marks}
+    return zipped(json.dumps(marks, ensure_ascii=False, separators=(",", ":")).encode())
 
 
 def _clouds(made: Clouds) -> View:
@@ -286,11 +295,10 @@ def _row(pair: PairRow) -> View:
 
 
 def _pane(pair: PairRow, thumbs: Thumbnails) -> View:
-    """The text of the pane beside the pictures of a pair, what is drawn over these, and the evidence."""
+    """The text of the pane beside the pictures of a pair, the features in these, and the evidence."""
     evidence = weighed(pair.outcome.evidence, pair.run.least_odds)
     drawn, features = thumbs.drawings.get(pair.key), thumbs.features.get(pair.key)
     return {
-        "marks": drawn[:2] if drawn is not None and drawn.marks else None,
         "features": None if features is None else [features.text, features.ends.ravel().tolist()],
         "lacking": _not_shown(drawn),
         "from": str(pair.outcome.from_ns),

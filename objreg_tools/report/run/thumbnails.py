@@ -11,12 +11,13 @@ from objreg_ros.data.images import DepthImage
 from objreg_ros.registration.prepare.keypoints import Keypoints
 from objreg_tools.report.closures.matched_features import FeatureLines, feature_lines, keypoints_in
 from objreg_tools.report.closures.matched_objects import Drawn, pair_drawing
+from objreg_tools.report.packed import zipped
 from objreg_tools.report.run.pairs import PairRow, by_interest
 from objreg_tools.report.run.pictures import Album, data_uri, overlay
 
 PAGE_BYTES = 7_000_000  # of all thumbnails of a page; that of one run has 15 MB for everything
 LINE_BYTES = 16  # of a line between two features
-QUALITY = 70  # of a JPEG: half the bytes of what the galleries show
+QUALITY = 75  # of a WebP: two thirds of the bytes of what the galleries show
 
 
 @dataclass
@@ -46,7 +47,7 @@ class Thumbnails:
         T_from_to = pair.outcome.T_from_to
         over = "" if T_from_to is None else data_uri(overlay(first, second, T_from_to), QUALITY)
         drawn = pair_drawing(pair, first, second)
-        size = sum(map(len, moments.values())) + len(over) + len(drawn.marks)
+        size = sum(map(len, moments.values())) + len(over) + len(zipped(drawn.marks.encode()))
         if self.size + size > most_bytes:
             self.left_out += 1
             return

@@ -9,6 +9,7 @@ function browse(article) {
   const body = section.querySelector("tbody");
   const rows = [...body.rows];
   const data = JSON.parse(section.querySelector("script.data").textContent);
+  const marks = unzipped(data.marks).json();
   const pane = section.querySelector("dialog");
   const part = (selector) => pane.querySelector(selector);
 
@@ -119,7 +120,7 @@ function browse(article) {
     svg.insertAdjacentHTML("afterbegin", `<g class="agree">${lines.join("")}</g>`);
   }
 
-  function drawEnds(pair, seconds) {
+  function drawEnds(key, pair, seconds) {
     const figure = part(".ends"), svg = figure.querySelector("svg");
     const known = [data.moments[pair.from], pair.from === pair.to ? "" : data.moments[pair.to]];
     figure.hidden = !known[0] && !known[1];
@@ -128,11 +129,15 @@ function browse(article) {
       image.hidden = !uri;
       if (uri) image.src = uri;
     });
-    const [marks, height] = pair.marks || ["", 240];
+    svg.innerHTML = "";
+    marks.then((all) => pane.dataset.pair === key && drawOver(svg, pair.features, ...(all[key] || ["", 240])));
+    figure.querySelector("figcaption").textContent = (pair.from === pair.to ? seconds[0] : seconds.join(" ↔ ")) + (pair.lacking && ". " + pair.lacking);
+  }
+
+  function drawOver(svg, features, marks, height) {
     svg.setAttribute("viewBox", "0 0 648 " + height);
     svg.innerHTML = marks;
-    drawFeatures(pair.features, svg);
-    figure.querySelector("figcaption").textContent = (pair.from === pair.to ? seconds[0] : seconds.join(" ↔ ")) + (pair.lacking && ". " + pair.lacking);
+    drawFeatures(features, svg);
   }
 
   // Without a secure page, as of file://, some browsers have no clipboard: then the command is selected.
@@ -148,6 +153,7 @@ function browse(article) {
   }
 
   function open(key) {
+    pane.dataset.pair = key;
     const pair = data.pairs[key], row = rows.find((other) => other.dataset.pair === key);
     const seconds = [row.dataset.from, row.dataset.to].map((text) => parseFloat(text).toFixed(1) + " s");
     part(".verdict").replaceChildren(row.querySelector(".tag").cloneNode(true));
@@ -155,14 +161,13 @@ function browse(article) {
       + row.querySelector(".labels").textContent;
     part(".words").textContent = pair.text;
     part(".meaning").textContent = pair.meaning;
-    drawEnds(pair, seconds);
+    drawEnds(key, pair, seconds);
     picture(part(".over"), data.overlays[key]);
     part(".blind").hidden = Boolean(data.moments[pair.from] || data.moments[pair.to]);
     listEvidence(pair);
     showCommand(pair.command);
     for (const link of article.querySelectorAll("[data-of]")) link.classList.toggle("chosen", link.dataset.of === key);
     if (!pane.open) pane.showModal();
-    pane.dataset.pair = key;
     const space = part(".space");
     space.dataset.pair = key;
     space.dispatchEvent(new CustomEvent("pair", { detail: key, bubbles: true }));

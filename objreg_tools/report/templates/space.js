@@ -9,14 +9,10 @@
   const spaces = [];
   let library;
 
-  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-
   async function load() {
     if (!document.createElement("canvas").getContext("webgl")) throw new Error("WebGL is off");
-    const packed = new Blob([bytes(document.querySelector("script.plotly").textContent)]);
-    const unpacked = packed.stream().pipeThrough(new DecompressionStream("gzip"));
     const script = document.createElement("script");
-    script.textContent = await new Response(unpacked).text();
+    script.textContent = await unzipped(document.querySelector("script.plotly").textContent).text();
     document.head.append(script);
     return window.Plotly;
   }
@@ -80,32 +76,50 @@
     return [...trajectories, ...scene.closures.map(links), ...objects, names];
   }
 
-  // The points of a camera after a pose (3, 4), row by row, with z up and y ahead.
-  function placed(cloud, pose) {
-    const [x, y, z] = points(cloud);
-    const row = (k) => x.map((value, n) => pose[k] * value + pose[k + 1] * y[n] + pose[k + 2] * z[n] + pose[k + 3]);
+  // What a camera measured on its grid of pixels: x, y and z of each point in its frame, and its column and row.
+  async function measured({ depth, unit, columns, camera: [fx, fy, cx, cy] }) {
+    const seen = [];
+    new Uint16Array(await unzipped(depth).arrayBuffer()).forEach((value, n) => {
+      const u = n % columns, v = Math.floor(n / columns), z = unit * value;
+      if (value) seen.push({ x: (u - cx) * z / fx, y: (v - cy) * z / fy, z, u, v });
+    });
+    return seen;
+  }
+
+  // Points after a pose (3, 4), row by row, with z up and y ahead.
+  function placed(seen, pose) {
+    const row = (k) => seen.map(({ x, y, z }) => pose[k] * x + pose[k + 1] * y + pose[k + 2] * z + pose[k + 3]);
     return { x: row(0), y: row(8), z: row(4).map((value) => -value) };
   }
 
-  function painted(cloud, tint) {
-    const rgb = bytes(cloud.rgb);
-    return Array.from({ length: rgb.length / 3 }, (_, n) => {
-      const [red, green, blue] = rgb.subarray(3 * n, 3 * n + 3);
+  // The colours of points in the picture of their moment.
+  async function painted(seen, [step, width, height], uri, tint) {
+    const image = new Image();
+    image.src = uri;
+    await image.decode();
+    const canvas = Object.assign(document.createElement("canvas"), { width: image.naturalWidth, height: image.naturalHeight });
+    const brush = canvas.getContext("2d", { willReadFrequently: true });
+    brush.drawImage(image, 0, 0);
+    const { data } = brush.getImageData(0, 0, canvas.width, canvas.height);
+    const at = (cell, size, shown) => Math.floor((step * cell + Math.floor(step / 2) + 0.5) / size * shown);
+    return seen.map(({ u, v }) => {
+      const pixel = 4 * (canvas.width * at(v, height, canvas.height) + at(u, width, canvas.width));
+      const [red, green, blue] = data.subarray(pixel, pixel + 3);
       return tint ? tint(Math.round(90 + 0.2 * red + 0.35 * green + 0.07 * blue)) : `rgb(${red},${green},${blue})`;
     });
   }
 
-  function pair(clouds, moments, key, paint) {
+  function pair(clouds, { moments, pairs }, key, paint) {
     const poses = [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], clouds.poses[key]];
-    return ["from", "to"].map((end, k) => {
-      const cloud = clouds.moments[moments[end]];
-      const marker = { size: 2.2, color: painted(cloud, TINTS[paint]?.[k]) };
-      return { type: "scatter3d", mode: "markers", ...placed(cloud, poses[k]), marker, hoverinfo: "skip",
+    return Promise.all(["from", "to"].map(async (end, k) => {
+      const stamp = pairs[key][end], cloud = clouds.moments[stamp], seen = await measured(cloud);
+      const marker = { size: 2.2, color: await painted(seen, cloud.grid, moments[stamp], TINTS[paint]?.[k]) };
+      return { type: "scatter3d", mode: "markers", ...placed(seen, poses[k]), marker, hoverinfo: "skip",
         showlegend: false };
-    });
+    }));
   }
 
-  // A place with a button and a drawing. `traces` gives what is drawn, or a text of why there is nothing;
+  // A place with a button and a drawing. `traces` gives what is drawn, at once or later, or a text of why there is nothing;
   // `chosen` receives the point that was clicked.
   class Space {
     constructor(place, direction, traces, chosen) {
@@ -125,7 +139,7 @@
     async drawNow() {
       this.button.setAttribute("aria-expanded", this.open);
       this.button.textContent = this.open ? "Hide the 3D view" : this.label;
-      const drawn = this.open ? this.traces() : "";
+      const drawn = this.open ? await this.traces() : "";
       this.plot.hidden = typeof drawn === "string";
       this.notice.textContent = this.plot.hidden ? drawn : "";
       if (!this.plot.hidden) await this.show(drawn).catch((error) => this.fail(error));
@@ -159,12 +173,12 @@
     const pane = article.querySelector("dialog.pane"), stored = article.querySelector("script.clouds");
     if (!stored) return;
     const place = pane.querySelector(".space"), paint = place.querySelector(".paint");
-    const pairs = JSON.parse(article.querySelector("script.data").textContent).pairs;
+    const data = JSON.parse(article.querySelector("script.data").textContent);
     let clouds;
     const space = new Space(place, [0.2, -1.3, 0.5], () => {
       const key = place.dataset.pair;
       clouds ??= JSON.parse(stored.textContent);
-      if (clouds.poses[key]) return pair(clouds, pairs[key], key, paint.querySelector("select").value);
+      if (clouds.poses[key]) return pair(clouds, data, key, paint.querySelector("select").value);
       return `There are no clouds of this pair: ${clouds.absent[key] ?? "no pose was found for it"}.`;
     });
     paint.addEventListener("change", () => space.draw());

@@ -47,7 +47,7 @@ def text(found: RegisteredPair, *pictures: Seen | None) -> str:
 
 def test_a_page_has_both_pictures_the_overlay_and_the_matches(found: RegisteredPair) -> None:
     page = text(found, seen(0.0), seen(20.0))
-    assert page.count("data:image/jpeg") == 5 and "http" not in page.replace("http://www.w3.org", "")
+    assert page.count("data:image/webp") == 5 and "http" not in page.replace("http://www.w3.org", "")
     assert "&lt;kitchen&gt;, one pair" in page and NAME not in page
     assert all(escape(term["phrase"]) in page for term in found.summary["odds"]["terms"])
 
@@ -82,5 +82,5 @@ def test_without_a_pose_no_feature_is_said_to_agree_or_to_disagree(found: Regist
 
 
 def test_a_page_does_without_pictures(found: RegisteredPair) -> None:
-    assert text(found, seen(0.0), None).count("data:image/jpeg") == 1
+    assert text(found, seen(0.0), None).count("data:image/webp") == 1
     assert "no pictures at these times" in text(found, None, None)

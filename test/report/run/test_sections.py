@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from objreg_tools.report.run.sections import view_of_run
 from objreg_tools.truth import Truth
 from report.run.test_thumbnails import Wall
 from report.runs import TRUE, TRUTH, closure, summary, tracked
+from report.test_packed import unzipped
 
 FINDING = {"what": "No image was read.", "cause": "All <malformed>.", "todo": "objreg inspect x", "anchor": "no-images"}
 
@@ -108,7 +110,7 @@ def test_the_pictures_of_a_pair_show_what_closed_it() -> None:
         row["outlines"] = ["400,300 500,300 500,400"]
     run = RunSummary.of("walk", {**stated, "constraints": [{**closure(5, 65), "labels": ["cup"]}]}, TRUTH)
     shown = view_of_run(run, Wall())
-    marks = shown["pairs"]["data"]["pairs"]["c0"]["marks"][0]
+    marks = json.loads(unzipped(shown["pairs"]["data"]["marks"]))["c0"][0]
     assert marks.count(">cup</text>") == 2 and marks.count('<polygon class="mark m0"') == 2
     assert shown["galleries"][0]["cards"][0]["drawn"].marks == marks
     assert page([(run, Wall())]).count('class="both"') == 1 + sum(len(g["cards"]) for g in shown["galleries"])
