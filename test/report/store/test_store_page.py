@@ -75,6 +75,8 @@ def test_in_a_browser_a_search_leaves_what_is_looked_for_and_nothing_is_cut_off(
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
         browser.get(file.as_uri())
         assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+        table = "const table = document.querySelector('.objects'); return table.scrollWidth - table.clientWidth"
+        assert browser.execute_script(table) <= 0, "the table of objects fits"
         overlaps, named = browser.execute_script(OVERLAPS)
         assert overlaps == [] and named > 0
         browser.execute_script(SEARCH, "CUP")
