@@ -28,7 +28,7 @@ from objreg_tools.report.batch.batch_tables import batch_tables, require_pyarrow
 from objreg_tools.workers import require_dask, spread
 
 PAGE = "report.html"
-HEAD = f"{'recording':32} {'frames':>7} {'constraints':>12} {'false':>6} {'s':>7}"
+HEAD = f"{'recording':32} {'frames':>7} {'revisits':>9} {'constraints':>12} {'false':>6} {'s':>7}"
 
 
 @click.command()
@@ -179,7 +179,8 @@ def _print_summary(rows: Sequence[Row], out: Path) -> None:
 
 
 def _line(row: Row) -> str:
-    return f"{row.name:32} {row.frames:>7} {row.constraints:>12} {_count(row.false):>6} {row.seconds or 0:>7.1f}"
+    closed = f"{_count(row.revisits):>9} {row.constraints:>12} {_count(row.false):>6}"
+    return f"{row.name:32} {row.frames:>7} {closed} {row.seconds or 0:>7.1f}"
 
 
 def _print_changes(changes: Sequence[Change], against: Path, out: Path) -> None:

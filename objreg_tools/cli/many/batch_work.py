@@ -19,6 +19,7 @@ from objreg_tools.recording.troubles import troubles
 from objreg_tools.report.batch.batch_schema import require_result
 from objreg_tools.report.run.about import about
 from objreg_tools.report.run.findings import as_json, find
+from objreg_tools.report.run.run_summary import RunSummary
 from objreg_tools.report.write import write_report
 from objreg_tools.workers import report_progress
 
@@ -73,8 +74,9 @@ class BatchWork:
             summary = opened.summary(run, self.arguments)
             summary["findings"] = as_json(find(summary, troubles(opened.source, opened.inputs)))
             notes = list(opened.notes)
+            revisits = RunSummary.of(recording.name, summary, opened.truth).closed_revisits.count
         seconds = round(time.perf_counter() - start, 3)
-        batch = {"made": self.made_of(recording), "seconds": seconds, "notes": notes}
+        batch = {"made": self.made_of(recording), "seconds": seconds, "notes": notes, "revisits": revisits}
         write_whole(self.file(recording), json.dumps({**summary, "batch": batch}, indent=1))
 
     def file(self, recording: Path) -> Path:

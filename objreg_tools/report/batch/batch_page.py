@@ -37,9 +37,12 @@ def batch_page(rows: Sequence[Row], about: Mapping[str, Any], against: str = "",
 
 
 def totals(rows: Sequence[Row]) -> dict[str, int]:
-    """What all recordings have together, by name; ``false`` only where a truth covers any."""
+    """What all recordings have together, by name; ``revisits`` only where they are known, ``false`` where truth is."""
     totals: dict[str, int] = {"recordings": len(rows), "failed": sum(bool(row.error) for row in rows)}
-    totals |= {name: sum(getattr(row, name) for row in rows) for name in ("frames", "objects", "constraints")}
+    totals |= {name: sum(getattr(row, name) for row in rows) for name in ("frames", "objects")}
+    closed = [row.revisits for row in rows if row.revisits is not None]
+    totals |= {"revisits": sum(closed)} if closed else {}
+    totals["constraints"] = sum(row.constraints for row in rows)
     judged = [row.false for row in rows if row.false is not None]
     return {**totals, "false": sum(judged)} if judged else totals
 

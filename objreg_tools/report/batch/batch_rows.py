@@ -21,6 +21,7 @@ class Row:
     detections: int = 0
     objects: int = 0
     constraints: int = 0
+    revisits: int | None = None  # that constraints close; None where it is not known
     strict: int | None = None
     loose: int | None = None
     false: int | None = None
@@ -43,6 +44,7 @@ class Row:
             file=file,
             **{name: summary[name] for name in ("frames", "detections", "objects")},
             constraints=len(summary["constraints"]),
+            revisits=summary["batch"].get("revisits"),  # older files lack it
             **judged,
             rejected=summary["rejected"],
             seconds=summary["batch"]["seconds"],

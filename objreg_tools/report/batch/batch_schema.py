@@ -7,8 +7,9 @@ The file may have been edited, or be of another program.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from reprlib import repr as short
+from types import MappingProxyType
 from typing import Any
 
 Kind = Callable[[Any, str], None]
@@ -55,14 +56,16 @@ def _is_unicode(value: Any) -> bool:
     return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
 
 
-def _fields(**kinds: Kind) -> Kind:
-    """A mapping with at least these names."""
+def _fields(newer: Mapping[str, Kind] = MappingProxyType({}), /, **kinds: Kind) -> Kind:
+    """A mapping with at least these names; those that are ``newer`` an older file lacks."""
 
     def check(value: Any, name: str) -> None:
         _expect(isinstance(value, dict), name, "a mapping", value)
-        for field, kind in kinds.items():
+        for field in kinds:
             _expect(field in value, name, f"to have {field}", list(value))
-            kind(value[field], f"{name}.{field}")
+        for field, kind in {**newer, **kinds}.items():
+            if field in value:
+                kind(value[field], f"{name}.{field}")
 
     return check
 
@@ -124,5 +127,5 @@ RESULT = _fields(
     stage_ms=_by_name(_fields(p50=_number)),
     findings=_list(_fields(what=_text, cause=_text, todo=_text, anchor=_text)),
     truth=_fields(count=COUNT, strict=COUNT, loose=COUNT, false=COUNT),
-    batch=_fields(made=_by_name(_anything), seconds=_duration, notes=_list(_text)),
+    batch=_fields({"revisits": _optional(COUNT)}, made=_by_name(_anything), seconds=_duration, notes=_list(_text)),
 )

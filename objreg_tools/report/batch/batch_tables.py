@@ -113,7 +113,7 @@ def _schemas(arrow: ModuleType) -> dict[str, Any]:
     text, whole, number = arrow.string(), arrow.int64(), arrow.float64()
     numbers = arrow.map_(text, number)
     ends = {"recording": text, "from_ns": whole, "to_ns": whole, "T_from_to": arrow.list_(number)}
-    counts = ("frames", "detections", "objects", "constraints", "strict", "loose", "false")
+    counts = ("frames", "detections", "objects", "constraints", "revisits", "strict", "loose", "false")
     recordings = {
         **dict.fromkeys(("name", "recording", "file", "page", "error"), text),
         **dict.fromkeys(counts, whole),

@@ -61,6 +61,11 @@ class ClosedRevisits:
         )
 
     @property
+    def count(self) -> int | None:
+        """How many revisits the constraints close; None where they show none, and of some it is not known."""
+        return len(self.revisits) if self.revisits or not self.unknown else None
+
+    @property
     def closing(self) -> int:
         """How many constraints close a revisit."""
         return sum(map(len, self.revisits))

@@ -7,7 +7,17 @@ from objreg_tools.report.batch.batch_comparison import Change
 from objreg_tools.report.batch.batch_page import batch_page, totals
 from objreg_tools.report.batch.batch_rows import Row
 
-GOOD = Row("a", "/a", "a.json", frames=9, constraints=4, false=1, rejected={"slack": 3}, stage_p50_ms={"detect": 2.0})
+GOOD = Row(
+    "a",
+    "/a",
+    "a.json",
+    frames=9,
+    constraints=4,
+    revisits=2,
+    false=1,
+    rejected={"slack": 3},
+    stage_p50_ms={"detect": 2.0},
+)
 BLIND = Row("b", "/b", "b.json", frames=1, constraints=2, rejected={"slack": 4}, stage_p50_ms={"detect": 4.0})
 GONE = Row("<c>", "/c", error="no such <file>")
 
@@ -15,7 +25,14 @@ GONE = Row("<c>", "/c", error="no such <file>")
 def test_sums_are_over_all_and_false_ones_where_truth_tells() -> None:
     told = totals([GOOD, BLIND, GONE])
     assert (told["recordings"], told["failed"], told["frames"], told["constraints"], told["false"]) == (3, 1, 10, 6, 1)
-    assert "false" not in totals([BLIND])
+    assert "false" not in totals([BLIND]) and "revisits" not in totals([BLIND])
+    assert told["revisits"] == 2
+
+
+def test_revisits_have_a_column_of_their_own_beside_constraints() -> None:
+    page = batch_page([GOOD, BLIND], {})
+    assert '<td class="number">2</td><td class="number">4</td>' in page, "two revisits, closed by four constraints"
+    assert '<td class="number">–</td><td class="number">2</td>' in page, "not known of how many revisits"
 
 
 def test_a_page_has_every_recording_every_reason_and_every_failure() -> None:

@@ -15,13 +15,14 @@ SUMMARY = {
     "findings": [],
     "truth": TRUTH,
     "stage_ms": {"detect": {"p50": 1.5, "p95": 2.0}},
-    "batch": {"seconds": 7.0},
+    "batch": {"seconds": 7.0, "revisits": 2},
 }
 
 
 def test_a_row_counts_what_a_run_found() -> None:
     row = Row.of(Path("/runs/a"), "a.json", SUMMARY)
     assert (row.name, row.frames, row.constraints, row.false, row.seconds) == ("a", 5, 6, 3, 7.0)
+    assert row.revisits == 2 and Row.of(Path("/a"), "", {**SUMMARY, "batch": {"seconds": 1.0}}).revisits is None
     assert row.stage_p50_ms == {"detect": 1.5} and row.rejected == {"slack": 2}
 
 

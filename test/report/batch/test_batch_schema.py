@@ -35,7 +35,7 @@ RESULT: dict[str, Any] = {
     "rejected": {"few_points": 1},
     "stage_ms": {"total": {"p50": 5.0, "p95": 6.0}},
     "truth": {"count": 1, "strict": 1, "loose": 1, "false": 0},
-    "batch": {"made": {"version": "1"}, "seconds": 3.0, "notes": ["a note"]},
+    "batch": {"made": {"version": "1"}, "seconds": 3.0, "notes": ["a note"], "revisits": 1},
 }
 FREE = ("version", "p95")
 """What the schema leaves open."""

@@ -57,7 +57,7 @@ def test_twelve_constraints_of_one_return_are_one_revisit() -> None:
     closures = [constraint(a, b) for a in (0.4, 2.0, 4.0, 5.4) for b in (10.6, 12.4, 15.0)]
     of = found(closures, AWAY)
     assert len(of.revisits) == 1 and of.closing == 12 and not of.stayed and not of.unknown
-    assert of.text == "1 revisit, closed by 12 constraints"
+    assert of.text == "1 revisit, closed by 12 constraints" and of.count == 1
 
 
 def test_two_returns_are_two_revisits_whatever_they_are_tied_to() -> None:
@@ -110,8 +110,10 @@ def test_a_place_of_an_earlier_run_or_of_another_camera_was_left() -> None:
 
 
 def test_a_run_without_frames_does_not_know() -> None:
-    assert ClosedRevisits.of([constraint(0, 9)], Walk([], False)).unknown == (0,)
-    assert ClosedRevisits.of([], Walk([], False)).text == ""
+    of = ClosedRevisits.of([constraint(0, 9)], Walk([], False))
+    assert of.unknown == (0,) and of.count is None
+    none = ClosedRevisits.of([], Walk([], False))
+    assert none.text == "" and none.count == 0
 
 
 @pytest.mark.parametrize(("field_deg", "left"), [((60.0, 45.0), True), ((120.0, 90.0), False)])
