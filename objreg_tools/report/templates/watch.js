@@ -49,7 +49,8 @@ function line(points, style, at) {
 }
 
 function above(state) {
-  const pairs = [["accepted", "accepted link"], ["rejected", "faint"]].flatMap(([name, style]) =>
+  // What was accepted is drawn over what was refused.
+  const pairs = [["rejected", "faint"], ["accepted", "accepted link"]].flatMap(([name, style]) =>
     (state.edges[name] ?? []).flatMap((point, k, all) => (k % 2 ? [[[all[k - 1], point], style]] : [])));
   const objects = state.objects.map(([name, x, y]) => [name, [x, y]]);
   const all = [...state.odometry, ...state.corrected, ...pairs.flatMap(([ends]) => ends), ...objects.map((o) => o[1])];
