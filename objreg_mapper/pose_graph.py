@@ -126,7 +126,7 @@ class PoseGraph:
         self.sessions.learn_from(closure)
 
     def withdraw(self, is_withdrawn: Callable[[LoopClosure], bool]) -> int:
-        """Take closures out of the graph, for good; how many."""
+        """Take closures out of the graph; how many. One that comes again is another tie."""
         found = {k for k, tie in enumerate(self._closures) if tie.closure is not None and is_withdrawn(tie.closure)}
         new = found - self._withdrawn
         self._withdrawn |= new

@@ -38,6 +38,7 @@ class Adapter(NodeBase):
         self.waiting: dict[Moments, LoopClosure] = {}
         self._taken: dict[Moments, bool] = {}  # whether it was handed over; of all that came, the oldest first
         self._keys: dict[str, Moments] = {}  # id of objreg_msgs → key
+        self._may_come_again = set[str]()  # ids that were retracted, and are not with the consumer
         self._again = self._retracted = self._retracted_late = 0
 
     # What a subclass fills in
@@ -83,11 +84,15 @@ class Adapter(NodeBase):
         if message.retracted:
             self._retract(message.id)
             return
+        if message.id in self._may_come_again:
+            self._may_come_again.discard(message.id)
+            self._taken.pop(self._keys[message.id], None)
         closure = self._take("loop_closures", message, closures_msg.read_loop_closure)
         if closure is not None:
             self._keys[headers.bounded(message.id, "id")] = closure.moments
             while len(self._keys) > MOST_KNOWN:
-                del self._keys[next(iter(self._keys))]
+                self._may_come_again.discard(oldest := next(iter(self._keys)))
+                del self._keys[oldest]
 
     def _take(self, topic: str, message: Any, decode: Any) -> LoopClosure | None:
         """The constraint of a message, which waits from now on unless it came before; None for one that is none."""
@@ -116,17 +121,21 @@ class Adapter(NodeBase):
         key = self._keys.get(name)
         self._retracted += 1
         if key in self.waiting:
+            if not self.is_in_flight(key):
+                self._may_come_again.add(name)
             self.drop_constraint(key, "retracted")
             return
-        if key is not None and self._taken.get(key, False):
-            self._withdraw(key)
+        if key is not None and self._taken.get(key, False) and self._withdraw(key):
+            self._may_come_again.add(name)
 
-    def _withdraw(self, key: Moments) -> None:
-        """Take back what was handed over, and say where that is too late."""
+    def _withdraw(self, key: Moments) -> bool:
+        """Take back what was handed over, and say where that is too late; whether it was not."""
         self._taken[key] = False  # it came: by whatever topic it comes again, it stays out
-        if not self.take_back(key):
-            self._retracted_late += 1
-            self.throttled.warn("retracted_late", "a constraint is withdrawn that its consumer has and cannot give up")
+        if self.take_back(key):
+            return True
+        self._retracted_late += 1
+        self.throttled.warn("retracted_late", "a constraint is withdrawn that its consumer has and cannot give up")
+        return False
 
     # What waits
 

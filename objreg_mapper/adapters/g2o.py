@@ -90,7 +90,7 @@ class ToG2o(Adapter):
 
     def take_back(self, key: Moments) -> bool:
         """Leave the edge out of the file from now on."""
-        self._graph.withdraw(lambda closure: closure.moments == key)
+        self._graph.withdraw(lambda closure: closure.moments == key)  # it may come again, as another tie
         self._has_news = True
         return True
 

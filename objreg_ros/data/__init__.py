@@ -4,6 +4,7 @@
 images     a camera, its pictures, depth and clouds, and the detections in a picture
 frames     what one camera saw at one time: the clouds of objects, the view; IMU and odometry beside it
 closures   two keyframes of one place: alignment, loop closure, relocalisation, and the reasons of refusals
+closure_id   the id of a closure, which lasts
 closure_fields   closures as plain values under the names of their fields, and back
 checked    how a data type checks its fields
 

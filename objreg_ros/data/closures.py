@@ -200,6 +200,7 @@ class Reason(Enum):
     CLOCK = "clock_began_anew"
     NEIGHBOURS = "neighbours_disagree"
     CAMERA = "camera_implausible"
+    VETOED = "vetoed"
 
 
 UNTRIED = frozenset(

@@ -7,12 +7,13 @@ A row that is missing has no checksum that could be wrong. So the counters are w
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 
 from objreg_ros.memory.checksum import Row, require_sealed, sealed
 
-TABLES = ("keyframe", "object", "closure")
-MOST_IDS = {"keyframe": 2**53, "object": 2**53, "closure": 2**53, "landmark": 2**32 - 2}  # u32 on the wire
+TABLES = ("keyframe", "object", "closure", "veto")
+MOST_IDS = {**dict.fromkeys(TABLES, 2**53), "landmark": 2**32 - 2}  # u32 on the wire
 
 
 @dataclass(slots=True)
@@ -22,10 +23,12 @@ class Counters:
     keyframe: int = 0
     object: int = 0
     closure: int = 0
+    veto: int = 0
     landmark: int = 0
     keyframe_rows: int = 0
     object_rows: int = 0
     closure_rows: int = 0
+    veto_rows: int = 0
     forgotten: int = 0
 
     def next(self, what: str) -> int:
@@ -43,7 +46,7 @@ class Counters:
 
     def emptied(self) -> Counters:
         """Those of a store in which nothing is, but where the same ids were given."""
-        return Counters(keyframe=self.keyframe, object=self.object, closure=self.closure, landmark=self.landmark)
+        return Counters(**{what: getattr(self, what) for what in MOST_IDS})
 
     def enter(self, table: str, number: int) -> None:
         """Count a row that is written under that number."""
@@ -62,9 +65,9 @@ class Counters:
             f"REPLACE INTO counters ({names}) VALUES ({', '.join('?' * len(row))})", tuple(row.values())
         )
 
-    def require_rows(self, connection: sqlite3.Connection) -> None:
+    def require_rows(self, connection: sqlite3.Connection, tables: Sequence[str] = TABLES) -> None:
         """ValueError unless the tables have as many rows as were counted."""
-        for table in TABLES:
+        for table in tables:
             expected = getattr(self, f"{table}_rows")
             (found,) = connection.execute(f"SELECT COUNT(*) FROM {table}").fetchone()
             if found != expected:

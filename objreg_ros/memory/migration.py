@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Older stores: all that they say, written anew into a store of this version.
 
-Version 5 is that of 0.2.0, the first release: it knew of one robot only. Both older versions have what a keyframe shows
-and the points of objects in the rows of these, and several checksums in a row.
+Version 5 is that of 0.2.0, the first release: it knew of one robot only. It and version 6 have what a keyframe shows
+and the points of objects in the rows of these, and several checksums in a row. Version 7 knows of no vetoes.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data.closure_fields import closure_of
-from objreg_ros.memory.checksum import checksum, checksum_of, require_same, sealed
+from objreg_ros.memory.checksum import checksum, checksum_of, require_same, require_sealed, sealed
 from objreg_ros.memory.claim import Claim
 from objreg_ros.memory.codec import closure_row
-from objreg_ros.memory.counters import MOST_IDS, TABLES, Counters, counters_row, read_counters
-from objreg_ros.memory.store_file import SCHEMA_VERSION, bear, check, connect, read_only_uri
+from objreg_ros.memory.counters import MOST_IDS, Counters, counters_row, read_counters
+from objreg_ros.memory.store_file import SCHEMA, SCHEMA_VERSION, bear, check, connect, read_only_uri
 
 ROBOT = {"robot": "", "origin": ""}  # of a keyframe of the version of one robot
 HEADS = {  # columns of a keyframe that have a checksum of their own, by version
@@ -34,11 +34,14 @@ LIGHT = (  # of an object, all but its points
     *("id", "keyframe", "instance", "landmark", "label", "score", "extent", "sightings", "density"),
     *("position", "camera", "R_landmark_session", "descriptor", "cloud_crc"),
 )
-SEALS = ("seal", "whole", "cloud_crc")
+SEALS = ("seal", "whole", "cloud_crc", "checksum")
 MOVED = {"keyframe": ("scene", {"view": "view", "context": "context"}), "object": ("cloud", {"cloud": "points"})}
 """Columns of older versions that are in a table of their own now, and their names there."""
 
+BESIDE = ("scene", "cloud")  # tables that version 7 has, too
+OLD_TABLES = ("keyframe", "object", "closure")  # that are counted
 MOST_BLOB = 1 << 26  # bytes
+WITHOUT_VETOES = "DROP TABLE veto; ALTER TABLE counters DROP COLUMN veto; ALTER TABLE counters DROP COLUMN veto_rows;"
 TABLES_6 = """
 CREATE TABLE keyframe (
   id INTEGER PRIMARY KEY, robot TEXT NOT NULL, origin TEXT NOT NULL, session INTEGER NOT NULL,
@@ -91,37 +94,50 @@ def renew(path: Path, target: sqlite3.Connection) -> None:
 
 
 def _copy(source: sqlite3.Connection, target: sqlite3.Connection, version: int) -> None:
-    given = _counters(source)
+    given = _counters(source, version)
     counters = given.emptied()  # the ids that were given are used up
     counters.forgotten = given.forgotten if version > 5 else 0
     bear(target)
     with target as transaction:
-        for table in TABLES:
+        for table in OLD_TABLES:
             for row in _rows(source, table, version):
                 for name, written in _renewed_rows(table, row, version):
                     insert(transaction, name, written)
                 counters.enter(table, row["id"])
                 counters.landmark = max(counters.landmark, row.get("landmark", 0))
+        for table in BESIDE if version == 7 else ():
+            for row in _rows(source, table, version):
+                insert(transaction, table, sealed(table, row))
         for what in MOST_IDS:
             counters.next(what)
         counters.write(transaction)
 
 
-def _counters(source: sqlite3.Connection) -> Counters:
+def _counters(source: sqlite3.Connection, version: int) -> Counters:
     """The counters of an older version. ValueError where they are damaged or do not agree with what there is."""
+    if version == 7:
+        row = counters_row(source, "counters")
+        require_sealed("the counters", "counters", row)
+        return _counted(source, row)
     row = counters_row(source, "books")
     require_same("the counters", row["seal"], checksum_of("books", row, "seal"))
-    counters = Counters(**{field.name: row[field.name] for field in fields(Counters)})
-    counters.require_rows(source)
-    for table in TABLES:
+    counters = _counted(source, row)
+    for table in OLD_TABLES:
         (found,) = source.execute(f"SELECT COALESCE(SUM(seal), 0) FROM {table}").fetchone()
         require_same(f"the {table}s", row[f"{table}_seals"], found)
     return counters
 
 
+def _counted(source: sqlite3.Connection, row: Mapping[str, Any]) -> Counters:
+    """The counters of a row that may have no vetoes. ValueError where they do not agree with what there is."""
+    counters = Counters(**{field.name: row[field.name] for field in fields(Counters) if field.name in row})
+    counters.require_rows(source, OLD_TABLES)
+    return counters
+
+
 def _renewed_rows(table: str, row: dict[str, Any], version: int) -> Iterator[tuple[str, dict[str, Any]]]:
     """The rows of this version, each with its table, that say what one of an older version does."""
-    if table == "closure":
+    if table == "closure" or version == 7:
         yield table, _closure(row) if version == 5 else sealed(table, row)
         return
     beside, names = MOVED[table]
@@ -177,14 +193,16 @@ def _rows(source: sqlite3.Connection, table: str, version: int) -> Iterator[dict
 def _opened(table: str, row: dict[str, Any], version: int) -> dict[str, Any]:
     """A row without its checksums; ValueError where they are wrong."""
     what = f"{table} {row['id']}"
-    if table == "closure":
+    if version == 7:
+        require_sealed(what, table, row)
+    elif table == "closure":
         require_same(what, row["seal"], checksum_of(table, row, "seal"))
     else:
         names = HEADS[version] if table == "keyframe" else LIGHT
         require_same(what, row["seal"], checksum(table, (row[name] for name in names)))
-    if table == "keyframe":
+    if table == "keyframe" and version < 7:
         require_same(what, row["whole"], checksum_of(table, row, "whole"))
-    if table == "object":
+    if table == "object" and version < 7:
         require_same(f"the points of {what}", row["cloud_crc"], zlib.crc32(row["cloud"]))
     return {name: value for name, value in row.items() if name not in SEALS}
 
@@ -192,7 +210,7 @@ def _opened(table: str, row: dict[str, Any], version: int) -> dict[str, Any]:
 def _require_parts(source: sqlite3.Connection, version: int) -> None:
     """ValueError unless a database has the tables, columns and indices of the older version, and nothing else."""
     with closing(sqlite3.connect(":memory:")) as model:
-        model.executescript(TABLES_6)
+        model.executescript(SCHEMA + WITHOUT_VETOES if version == 7 else TABLES_6)
         if version == 5:
             dropped = "".join(f"ALTER TABLE keyframe DROP COLUMN {name};" for name in ROBOT)
             model.executescript(f"{dropped} DROP TABLE closure; {CLOSURES_5};")

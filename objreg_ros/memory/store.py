@@ -39,7 +39,16 @@ from objreg_ros.memory.store_file import (
     shrink,
     temporary,
 )
-from objreg_ros.memory.transaction import SESSION, delete, rename_landmarks, write_closures, write_keyframe
+from objreg_ros.memory.transaction import (
+    SESSION,
+    delete,
+    rename_landmarks,
+    take_veto_back,
+    write_closures,
+    write_keyframe,
+    write_veto,
+)
+from objreg_ros.memory.veto import Stand, Veto, veto_from_row
 from objreg_ros.registration.keyframe import Keyframe
 
 LEFT = "; it was left as it is. Use a copy of it or another path"
@@ -108,6 +117,37 @@ class Store:
             write_closures(transaction, counters, (closure,), MOST_CLOSURES)
             rename_landmarks(transaction, merged)
 
+    def veto(self, vetoes: Sequence[Veto]) -> None:
+        """Withdraw closures, all or none: each is a veto from now on, and no closure of this store any more.
+
+        StoreError where that cannot be written.
+        """
+        numbers = self._numbers("closure")
+        with self._reporting("veto a closure"), self._changing() as (transaction, counters):
+            for one in vetoes:
+                write_veto(transaction, counters, numbers.get(_key(one.closure)), one)
+
+    def undo_veto(self, vetoes: Sequence[Veto]) -> None:
+        """Take vetoes back, all or none: what was a closure of this store is one again. KeyError for one that is none.
+
+        StoreError where that cannot be written.
+        """
+        numbers = self._numbers("veto")
+        with self._reporting("undo a veto"), self._changing() as (transaction, counters):
+            for one in vetoes:
+                take_veto_back(transaction, counters, numbers[_key(one.closure)], one, MOST_CLOSURES)
+
+    def vetoes(self) -> list[Veto]:
+        """Every closure that is withdrawn, the oldest veto first."""
+        with self._reporting("read the vetoes", LEFT):
+            return list(map(veto_from_row, self._connection.execute("SELECT * FROM veto ORDER BY id")))
+
+    def _numbers(self, table: str) -> dict[tuple[object, ...], int]:
+        """The numbers of the rows of closures or vetoes, by moments and sessions."""
+        with self._reporting("read the closures"):
+            read = closure_from_row if table == "closure" else lambda row: veto_from_row(row).closure
+            return {_key(read(row)): row["id"] for row in self._connection.execute(f"SELECT * FROM {table}")}
+
     def keyframe(self, keyframe_id: int) -> Keyframe:
         """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""
         if (recent := self._recent.get(keyframe_id)) is not None:
@@ -137,6 +177,19 @@ class Store:
     def keyframe_ids(self) -> list[int]:
         """The ids of the stored keyframes, oldest first."""
         return list(self._heads)
+
+    def keyframe_at(self, session: int | None, stamp_ns: int) -> int | None:
+        """The id of the keyframe of a session at a stamp; None where there is none."""
+        heads = self._heads.values()
+        return next((h["id"] for h in heads if h["session"] == session and h["stamp_ns"] == stamp_ns), None)
+
+    def stand_at(self, session: int | None, stamp_ns: int) -> Stand | None:
+        """Where the keyframe of a session at a stamp stood; None where there is none, or it is damaged."""
+        number = self.keyframe_at(session, stamp_ns)
+        try:
+            return None if number is None else Stand.of(self.keyframe(number))
+        except StoreError:
+            return None
 
     def beyond(self, most: int, most_bytes: float = math.inf) -> list[int]:
         """The ids of the oldest keyframes, those that are more than ``most`` or make the store larger than that.
@@ -176,10 +229,10 @@ class Store:
         A file is not emptied: it keeps all that it has under a dated name beside, and a new one takes its place.
         StoreError where that cannot be: then everything is as it was.
         """
-        if self._claim is not None and (self._heads or self._counters.closure_rows):
+        if self._claim is not None and (self._heads or self._counters.closure_rows or self._counters.veto_rows):
             return self._set_aside(self._claim)
         with self._reporting("forget everything"), self._changing() as (transaction, counters):
-            for table in ("closure", "object", "keyframe"):
+            for table in ("veto", "closure", "object", "keyframe"):
                 delete(transaction, counters, table)
             counters.forgotten = 0
         self._begin(counters)
@@ -243,7 +296,10 @@ class Store:
         return {head["origin"]: (head["session"], head["stamp_ns"]) for head in heads}
 
     def counts(self) -> dict[str, int]:
-        """How much is stored; ``forgotten`` are keyframes that went as there were too many."""
+        """How much is stored; ``forgotten`` are keyframes that went as there were too many.
+
+        ``vetoed`` are closures that a person withdrew; ``closures`` are the others.
+        """
         with self._reporting("count"):
             landmarks = self._connection.execute("SELECT COUNT(DISTINCT landmark) FROM object").fetchone()[0]
         return {
@@ -252,6 +308,7 @@ class Store:
             "landmarks": landmarks,
             "sessions": len({head["session"] for head in self._heads.values()}),
             "closures": self._counters.closure_rows,
+            "vetoed": self._counters.veto_rows,
             "forgotten": self._counters.forgotten,
         }
 
@@ -288,3 +345,8 @@ class Store:
         except (sqlite3.Error, ValueError, OverflowError, OSError) as error:
             why = " ".join(str(error).split())
             raise StoreError(f"{self.path or 'temporary store'}: cannot {what}: {why}{advice}") from error
+
+
+def _key(closure: LoopClosure) -> tuple[object, ...]:
+    """What makes a closure another: its moments, robots and sessions."""
+    return *closure.moments, *closure.robots, closure.from_session, closure.to_session

@@ -15,7 +15,7 @@ from objreg_ros.memory.counters import Counters
 from objreg_ros.whole_file import whole_file
 
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
-SCHEMA_VERSION = 7  # at byte 60
+SCHEMA_VERSION = 8  # at byte 60
 OLDEST_VERSION = 5  # that of the first release
 SPARE = 2048  # pages of 4 kB that may lie free in the file: what comes next takes them
 CACHE_KB = 4096  # of the pages of a temporary store: some keyframes; a store of a few objects is never written
@@ -45,10 +45,13 @@ CREATE INDEX object_of_keyframe ON object (keyframe);
 CREATE INDEX object_of_landmark ON object (landmark);
 CREATE TABLE closure (
   id INTEGER PRIMARY KEY, from_session INTEGER, to_session INTEGER, fields TEXT NOT NULL, checksum INTEGER NOT NULL);
+CREATE TABLE veto (
+  id INTEGER PRIMARY KEY, from_session INTEGER, to_session INTEGER, was_stored INTEGER NOT NULL, fields TEXT NOT NULL,
+  from_stand BLOB, to_stand BLOB, checksum INTEGER NOT NULL);
 CREATE TABLE counters (
   id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL, object INTEGER NOT NULL, closure INTEGER NOT NULL,
-  landmark INTEGER NOT NULL, keyframe_rows INTEGER NOT NULL, object_rows INTEGER NOT NULL,
-  closure_rows INTEGER NOT NULL, forgotten INTEGER NOT NULL, checksum INTEGER NOT NULL);
+  veto INTEGER NOT NULL, landmark INTEGER NOT NULL, keyframe_rows INTEGER NOT NULL, object_rows INTEGER NOT NULL,
+  closure_rows INTEGER NOT NULL, veto_rows INTEGER NOT NULL, forgotten INTEGER NOT NULL, checksum INTEGER NOT NULL);
 """
 
 

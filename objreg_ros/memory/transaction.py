@@ -16,10 +16,12 @@ from objreg_ros.memory.counters import Counters
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import insert
 from objreg_ros.memory.sighting import Sighting
+from objreg_ros.memory.veto import MOST_VETOES, Veto, veto_row
 from objreg_ros.registration.keyframe import Keyframe
 
 OLDEST = "WHERE id IN (SELECT id FROM closure ORDER BY id LIMIT ?)"
-SESSION = "SELECT COALESCE(MAX(MAX(COALESCE(from_session, -1), COALESCE(to_session, -1))), -1) FROM closure"  # newest
+SESSION = """SELECT COALESCE(MAX(MAX(COALESCE(from_session, -1), COALESCE(to_session, -1))), -1)
+  FROM (SELECT from_session, to_session FROM closure UNION ALL SELECT from_session, to_session FROM veto)"""  # newest
 
 
 def write(transaction: sqlite3.Connection, counters: Counters, table: str, row: Mapping[str, Any]) -> None:
@@ -56,6 +58,23 @@ def write_closures(
         write(transaction, counters, "closure", closure_row(counters.next("closure"), closure))
     if counters.closure_rows > most:
         delete(transaction, counters, "closure", OLDEST, (counters.closure_rows - most,))
+
+
+def write_veto(transaction: sqlite3.Connection, counters: Counters, closure_number: int | None, veto: Veto) -> None:
+    """Enter a veto, and take the closure of that number out. ValueError where there are `MOST_VETOES`."""
+    if counters.veto_rows >= MOST_VETOES:
+        raise ValueError(f"expected at most {MOST_VETOES} vetoes, got one more")
+    write(transaction, counters, "veto", veto_row(counters.next("veto"), veto))
+    if closure_number is not None:
+        delete(transaction, counters, "closure", "WHERE id = ?", (closure_number,))
+
+
+def take_veto_back(
+    transaction: sqlite3.Connection, counters: Counters, veto_number: int, veto: Veto, most: int
+) -> None:
+    """Delete the veto of that number, and enter its closure again if it was one of this store."""
+    delete(transaction, counters, "veto", "WHERE id = ?", (veto_number,))
+    write_closures(transaction, counters, (veto.closure,) if veto.was_stored else (), most)
 
 
 def rename_landmarks(transaction: sqlite3.Connection, merged: Mapping[int, Merge]) -> None:

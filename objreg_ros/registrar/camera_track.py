@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.data.frames import Frame
@@ -18,6 +18,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registrar.relocalisation import Relocalisation
 from objreg_ros.registrar.thinning import Thinning
+from objreg_ros.registrar.vetoes import VETOED, Vetoes
 from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.keyframe import Keyframe
 
@@ -70,6 +71,23 @@ class CameraTrack:
         """Refuse all that waits; for what it waits for where no other refusal is given."""
         unproven, self.unproven = [waiting.refused(refusal or waiting.refusal) for waiting in self.unproven], []
         return (*unproven, *self.confirmation.give_up(refusal))
+
+    def withdraw(self, closures: Iterable[LoopClosure], vetoes: Vetoes) -> tuple[Rejected, ...]:
+        """Take back what these closures brought, and refuse what waits and says the same."""
+        for closure in closures:
+            if closure.from_session is not None:
+                self.thinning.withdraw(closure.from_session, closure.from_ns, closure.to_ns)
+        self.relocalisation.withdraw(closures)
+        gone = [waiting for waiting in self.unproven if vetoes.cover_waiting(waiting)]
+        self.unproven = [waiting for waiting in self.unproven if waiting not in gone]
+        return (*(waiting.refused(VETOED) for waiting in gone), *self.confirmation.withdraw(vetoes))
+
+    def admit(self, closure: LoopClosure, ends: tuple[Keyframe, Keyframe] | None) -> None:
+        """A closure holds again; ``ends`` are its keyframes, the later one first, None where one is not stored."""
+        if closure.to_session in self.sessions and closure.from_session is not None:
+            self.thinning.accept(closure.from_session, closure.from_ns, closure.to_ns)
+        if ends is not None:
+            self.relocalisation.add_closure(closure, *ends)
 
     def hold(self, decision: Decision, keyframe: Keyframe, named: Sequence[Sighting]) -> None:
         """Keep a pose that waits for other keyframes; ``named`` are the keyframe's sightings."""

@@ -10,19 +10,24 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import NamedTuple
 
+from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.closure import Decision, redundant, rejected
 from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.consistency import Standpoint
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.thinning import Thinning
+from objreg_ros.registrar.vetoes import VETOED, Vetoes
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.propose.prior import expect
+from objreg_ros.registration.propose.prior import Prior, expect
+from objreg_ros.registration.result import Registration
 
 
 class Budget(NamedTuple):
@@ -66,6 +71,7 @@ class Means(NamedTuple):
     gate: Gate
     confirmation: Confirmation
     pool: ThreadPoolExecutor
+    vetoes: Vetoes
 
 
 class Found(NamedTuple):
@@ -149,4 +155,16 @@ class Search:
         method.prepare(keyframe)
         prior = expect(keyframe, target, self._params)
         registered = pool.submit(align, keyframe, target, prior, self._params, method, gate)
-        return lambda: self._means.confirmation.decide(keyframe, target, prior, registered.result())
+        return lambda: self._decide(target, prior, registered.result())
+
+    def _decide(self, target: Keyframe, prior: Prior | None, registration: Registration) -> Decision | Rejected:
+        """What a registered pair comes to; what a person withdrew is refused, and nothing is said of it to others."""
+        best = registration.candidate
+        if best is None or not self._is_vetoed(target, best.T_target_source):
+            return self._means.confirmation.decide(self._keyframe, target, prior, registration)
+        refused = rejected(target.stamp_ns, self._keyframe, VETOED, target)
+        return replace(refused, T_from_to=best.T_target_source, evidence=registration.evidence)
+
+    def _is_vetoed(self, target: Keyframe, T_target_source: Array) -> bool:
+        vetoes = self._means.vetoes
+        return bool(vetoes) and vetoes.covers(Standpoint.of(self._keyframe), Standpoint.of(target), T_target_source)

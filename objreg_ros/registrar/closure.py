@@ -14,7 +14,7 @@ from objreg_ros.data.frames import UNNAMED
 from objreg_ros.geometry import transform
 from objreg_ros.memory.landmarks import Link
 from objreg_ros.memory.sighting import Sighting
-from objreg_ros.registrar.consistency import Support
+from objreg_ros.registrar.consistency import Standpoint, Support
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of
@@ -49,7 +49,7 @@ class WaitingClosure:
     """A constraint that waits for others to confirm it; ``accepted`` by the gate, and others disagree.
 
     ``refusal`` is what becomes of it if none do. ``pairs`` are the instances of each matched object in the keyframes
-    ``source_id`` and ``target_id``; ``R_there_here (3, 3)`` as in `Link`.
+    ``source_id`` and ``target_id``, which stood ``here`` and ``there``; ``R_there_here (3, 3)`` as in `Link`.
     """
 
     closure: LoopClosure
@@ -57,6 +57,8 @@ class WaitingClosure:
     accepted: bool
     source_id: int
     target_id: int
+    here: Standpoint
+    there: Standpoint
     pairs: tuple[tuple[int, int], ...]
     R_there_here: Array
 
@@ -143,6 +145,8 @@ def waiting_of(
         accepted=refusal[0] is Reason.NEIGHBOURS,
         source_id=keyframe.keyframe_id,
         target_id=decision.target.keyframe_id,
+        here=Standpoint.of(keyframe),
+        there=Standpoint.of(decision.target),
         pairs=tuple(
             (here[pair.source].cloud.instance, there[pair.target].cloud.instance) for pair in decision.candidate.matched
         ),

@@ -16,6 +16,7 @@ from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.registrar.closure import Decision, WaitingClosure, rejected
 from objreg_ros.registrar.consistency import Consistency, Standpoint, Statement, Support
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.vetoes import VETOED, Vetoes
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import spread_of
 from objreg_ros.registration.gate.likelihood import odds_of
@@ -102,6 +103,12 @@ class Confirmation:
         refused = [waiting.refused(refusal or waiting.refusal) for waiting in self._waiting.values()]
         self._waiting.clear()
         return refused
+
+    def withdraw(self, vetoes: Vetoes) -> list[Rejected]:
+        """Refuse what waits and is withdrawn, and forget what was said of it: right poses contradict it."""
+        gone = [number for number, waiting in self._waiting.items() if vetoes.cover_waiting(waiting)]
+        self._consistency.forget_where(lambda one: vetoes.covers(one.source, one.target, one.T_target_source))
+        return [self._waiting.pop(number).refused(VETOED) for number in gone]
 
     def _possible(self, candidate: Candidate, prior: Prior | None) -> bool:
         margin = candidate.perturbation_margin

@@ -8,7 +8,7 @@ where they slide along the same surface. So what disagrees counts too, unless it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -177,6 +177,13 @@ class Consistency:
             if one.source.session != now.session or now.travelled - one.source.travelled > REACH_M
         ]
         gone += list(self._statements)[: max(len(self._statements) + 1 - MOST - len(gone), 0)]
+        self._leave_out(gone)
+
+    def forget_where(self, is_meant: Callable[[Statement], bool]) -> None:
+        """Leave out statements for which ``is_meant`` is true: they agree with nothing and oppose nothing any more."""
+        self._leave_out([n for n, one in self._statements.items() if is_meant(one)])
+
+    def _leave_out(self, gone: Iterable[int]) -> None:
         for n in dict.fromkeys(gone):
             del self._statements[n]
             for m in self._agree.pop(n):

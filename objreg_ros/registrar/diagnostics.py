@@ -18,6 +18,7 @@ class RegistrarDiagnostics(Diagnostics):
     landmarks: int = reading("stored landmarks", "Landmarks that these objects are sightings of.", "landmarks")
     sessions: int = reading("stored sessions", "Sessions that these keyframes are of.", "sessions")
     closures: int = reading("stored closures", "Constraints in the store.", "constraints")
+    vetoed: int = reading("vetoed closures", "Constraints that a person withdrew.", "constraints")
     unsearched: int = reading(
         "stored unsearched", "Keyframes that newer ones overtook: stored, and not searched for.", "keyframes"
     )
@@ -45,6 +46,7 @@ class RegistrarDiagnostics(Diagnostics):
     confirmed: int = reading(
         "constraints confirmed by others", "Those of them with which other keyframes agreed.", "constraints"
     )
+    withdrawn: int = reading("constraints withdrawn", "Retractions that were published, for vetoes.", "constraints")
     rejected: Mapping[str, int] = family(
         "rejected: <reason>", "Closures that were refused, by [reason](wire.md#why-a-closure-is-refused).", "refusals"
     )

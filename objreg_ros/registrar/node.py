@@ -10,6 +10,7 @@ import math
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -94,9 +95,11 @@ class RegistrarNode(FramesNode):
         )
         refused.callback(self.searcher.close)
         self._announcements = Announcements(self)
+        self._announcements.retractions(self._registrar.vetoed)  # what was withdrawn while no node held the store
         self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
         self.serve_aside("~/reset", self._forget)
         self.serve_aside("~/save", self._settle_and_save)
+        self.serve_vetoes(self._veto)
         self.serve_enable("frames")
         if self._robot:
             asked = self.settings.of(ExchangeParams)
@@ -197,6 +200,7 @@ class RegistrarNode(FramesNode):
     def _publish(self, outcome: Outcome) -> None:
         with self._announcing:  # the searcher's thread and that of ~/save
             self._announcements.closures(outcome.closures)
+            self._announcements.retractions(outcome.withdrawn)
             self._announcements.refusals(outcome.rejected)
             self._count()
             self._whereabouts.look()
@@ -271,6 +275,19 @@ class RegistrarNode(FramesNode):
             return True, self._registrar.save()
         except (ValueError, OSError) as error:
             return False, str(error)
+
+    def _veto(self, ids: Sequence[str], undo: bool) -> tuple[bool, str]:
+        """Whether the closures are withdrawn, or hold again; why not, and then nothing has changed."""
+        change, robot = self._registrar.undo_veto if undo else self._registrar.veto, self.get_namespace().strip("/")
+        try:
+            outcome = change(ids, robot)
+        except (ValueError, OSError) as error:
+            return False, str(error)
+        self._publish(outcome)
+        return (
+            True,
+            f"{'brought back' if undo else 'withdrew'} {len(outcome.closures or outcome.withdrawn)} constraints",
+        )
 
     def shut(self) -> None:
         """End both workers, the search in hand early, store what they had not come to, let go of the store."""

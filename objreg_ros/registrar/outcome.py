@@ -13,10 +13,12 @@ from objreg_ros.data.closures import LoopClosure, Observation, Rejected
 class Outcome:
     """What became of a frame: accepted closures, refusals with reasons, and the keyframe that it completed, if any.
 
+    ``withdrawn`` are closures of before that a person has vetoed.
     With the objects of that keyframe under the ids of their landmarks, its camera, its session and its robot.
     """
 
     closures: tuple[LoopClosure, ...] = ()
+    withdrawn: tuple[LoopClosure, ...] = ()
     rejected: tuple[Rejected, ...] = ()
     keyframe_ns: int | None = None
     keyframe_id: int | None = None

@@ -3,19 +3,25 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
 
+from objreg_ros.data.closure_id import closure_id
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.veto import Stand, Stands, Veto
 from objreg_ros.registrar.closure import Decision, WaitingClosure, closure_of, links_of
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.vetoes import Vetoes
 from objreg_ros.registration.keyframe import Keyframe
+
+MOST_ELSEWHERE = 4096  # keyframes that others store, of which it is known where they stood
 
 
 class Recollection:
@@ -26,6 +32,8 @@ class Recollection:
         self.index = Index(params)
         self.landmarks = Landmarks(params, first=store.next_landmark())
         self.index.add_objects(self.landmarks.passing(store.sightings()))
+        self.vetoes = Vetoes(store.vetoes())
+        self._elsewhere = OrderedDict[tuple[int, int], Stand]()  # by session and stamp, of keyframes that others store
 
     @property
     def params(self) -> RegistrarParams:
@@ -70,10 +78,63 @@ class Recollection:
 
     def as_known(self, keyframe: Keyframe, decision: Decision) -> tuple[Sighting, ...]:
         """The objects of a keyframe that others store, with the landmarks of the stored ones that they are; else 0."""
+        self._elsewhere[keyframe.session, keyframe.stamp_ns] = Stand.of(keyframe)
+        while len(self._elsewhere) > MOST_ELSEWHERE:
+            self._elsewhere.popitem(last=False)
         named = list(sightings_of(keyframe))
         for link in links_of(keyframe, decision, list(self.store.sightings(decision.target.keyframe_id))):
             named[link.index] = named[link.index].of_landmark(link.of.landmark, np.eye(3))
         return tuple(named)
+
+    def named(self, ids: Sequence[str], robot: str, vetoed: bool) -> list[LoopClosure]:
+        """The closures of these ids among those that hold, or that are ``vetoed``. ValueError for an id of none.
+
+        ``robot`` is that of closures that name none. StoreError where the store is damaged.
+        """
+        among = (veto.closure for veto in self.vetoes) if vetoed else self.store.closures()
+        known = {closure_id(closure, robot): closure for closure in among}
+        lacking = [name for name in ids if name not in known]
+        if not ids or lacking:
+            what = "withdrawn" if vetoed else "stored"
+            raise ValueError(f"ids: expected those of {what} closures, got {', '.join(lacking)[:200] or 'none'}")
+        return [known[name] for name in dict.fromkeys(ids)]
+
+    def veto(self, closures: Sequence[LoopClosure]) -> list[Veto]:
+        """Withdraw stored closures: they are not found again. StoreError where that cannot be written."""
+        return self.take_vetoes([Veto(closure=closure, stands=self._stands(closure)) for closure in closures])
+
+    def take_vetoes(self, vetoes: Sequence[Veto]) -> list[Veto]:
+        """Take in vetoes, of this registrar or another. StoreError where that cannot be written."""
+        self.store.veto(vetoes)
+        for veto in vetoes:
+            self.vetoes.add(veto)
+        return list(vetoes)
+
+    def undo_veto(self, closures: Sequence[LoopClosure]) -> None:
+        """Let withdrawn closures hold again. StoreError where that cannot be written."""
+        self.store.undo_veto([veto for veto in self.vetoes if veto.closure in closures])
+        for closure in closures:
+            self.vetoes.remove(closure)
+
+    def ends_of(self, closure: LoopClosure) -> tuple[Keyframe, Keyframe] | None:
+        """The keyframes of a closure, the later one first; None where one is not stored or is damaged."""
+        there = self.store.keyframe_at(closure.from_session, closure.from_ns)
+        here = self.store.keyframe_at(closure.to_session, closure.to_ns)
+        with suppress(StoreError):
+            if there is not None and here is not None:
+                return self.store.keyframe(here), self.store.keyframe(there)
+        return None
+
+    def _stands(self, closure: LoopClosure) -> Stands:
+        return (
+            self._stand(closure.from_session, closure.from_ns),
+            self._stand(closure.to_session, closure.to_ns),
+        )
+
+    def _stand(self, session: int | None, stamp_ns: int) -> Stand | None:
+        if session is not None and (session, stamp_ns) in self._elsewhere:
+            return self._elsewhere[session, stamp_ns]
+        return self.store.stand_at(session, stamp_ns)
 
     def ties_of(self, camera: tuple[str, str]) -> list[tuple[int, int, int]]:
         """Session and stamp of the stored keyframe, and stamp of the other, of each closure to a robot's camera."""

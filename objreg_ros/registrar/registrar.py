@@ -24,6 +24,7 @@ from objreg_ros.memory.landmarks import Landmark
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.veto import Veto
 from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks
 from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, Search
 from objreg_ros.registrar.closure import Decision, observations, rejected
@@ -201,7 +202,7 @@ class Registrar:
         Both in one pass: no more pairs are registered once enough are accepted.
         """
         gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
-        means = Means(self._store, self._method, gate, track.confirmation, pool)
+        means = Means(self._store, self._method, gate, track.confirmation, pool, self._recollection.vetoes)
         return Search(keyframe, track.thinning, budget, means, self.params).run(candidates)
 
     def _none_alike(self, keyframe: Keyframe) -> Found:
@@ -290,6 +291,37 @@ class Registrar:
                 track.hold(decision, keyframe, self._recollection.as_known(keyframe, decision))
             outcome = Outcome(closures=closures, rejected=(*before, *found.refused), robot=keyframe.robot)
             return outcome.with_late(track.settle_waiting(keyframe.stamp_ns, self._recollection))
+
+    @property
+    def vetoed(self) -> tuple[LoopClosure, ...]:
+        """The closures that a person withdrew, the oldest veto first."""
+        with self._lock:
+            return tuple(veto.closure for veto in self._recollection.vetoes)
+
+    def veto(self, ids: Sequence[str], robot: str = "") -> Outcome:
+        """Withdraw the stored closures of these ids (`closure_id`), all or none; they are not found again (`vetoes`).
+
+        ``robot`` is that of closures that name none. What waited and says the same is refused. ValueError for an id
+        of none; StoreError where it cannot be written. Objects that a closure made one stay one.
+        """
+        with self._lock:
+            return self._withdrawn(self._recollection.veto(self._recollection.named(ids, robot, vetoed=False)))
+
+    def undo_veto(self, ids: Sequence[str], robot: str = "") -> Outcome:
+        """Let withdrawn closures hold again, all or none: the outcome has them. Errors as in `veto`."""
+        with self._lock:
+            closures = self._recollection.named(ids, robot, vetoed=True)
+            self._recollection.undo_veto(closures)
+            for closure in closures:
+                ends = self._recollection.ends_of(closure)
+                for track in self._tracks.all():
+                    track.admit(closure, ends)
+        return Outcome(closures=tuple(closures))
+
+    def _withdrawn(self, vetoes: Sequence[Veto]) -> Outcome:
+        closures = tuple(veto.closure for veto in vetoes)
+        refused = [track.withdraw(closures, self._recollection.vetoes) for track in self._tracks.all()]
+        return Outcome(withdrawn=closures, rejected=tuple(one for of in refused for one in of))
 
     def settle(self) -> Outcome:
         """Publish or refuse what still waits for other keyframes to confirm it: the end of a recording, or a save."""

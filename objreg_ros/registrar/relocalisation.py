@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +54,12 @@ class SessionTie(NamedTuple):
         """(4, 4) from the odometry of now into the earlier session's."""
         one = self.statement
         return one.target.T_session_camera @ one.T_target_source @ inverse(one.source.T_session_camera)
+
+    @property
+    def moments(self) -> tuple[int, int, int, int]:
+        """Session and stamp of the earlier keyframe, and of the later."""
+        target, source = self.statement.target, self.statement.source
+        return target.session, target.stamp_ns, source.session, source.stamp_ns
 
     def carried(self, here: Standpoint, metres: float) -> tuple[Array, Array]:
         """The camera ``here`` in the map (4, 4) by this tie and odometry, and the covariance of that (6, 6).
@@ -136,6 +142,19 @@ class Relocalisation:
             tie = _tie(closure, source, target)
             self._weigh(tie)
             self._ties = [*self._ties, tie][-MOST:]
+
+    def withdraw(self, closures: Iterable[LoopClosure]) -> None:
+        """Answer as if these closures had never come."""
+        gone = {(one.from_session, one.from_ns, one.to_session, one.to_ns) for one in closures}
+        with self._lock:
+            kept = [tie for tie in self._ties if tie.moments not in gone]
+            if len(kept) == len(self._ties):
+                return
+            self._received -= Counter(tie.statement.target.session for tie in self._ties if tie.moments in gone)
+            self._map, self._ties = None, []
+            for tie in kept:
+                self._weigh(tie)
+                self._ties.append(tie)
 
     def _weigh(self, tie: SessionTie) -> None:
         """Renew the answer with a tie, if it is believed."""

@@ -27,8 +27,10 @@ class Thinning:
         return any(one == session and abs(a - from_ns) < span and abs(b - to_ns) < span for one, a, b in pairs)
 
     def withdraw(self, session: int, from_ns: int, to_ns: int) -> None:
-        """Forget a closure that was accepted, and came to nothing."""
-        self._pairs[to_ns // self._span_ns].remove((session, from_ns, to_ns))
+        """Forget a closure that was accepted, and came to nothing or was withdrawn; nothing where it is not known."""
+        pairs = self._pairs.get(to_ns // self._span_ns, [])
+        if (pair := (session, from_ns, to_ns)) in pairs:
+            pairs.remove(pair)
 
     def accept(self, session: int, from_ns: int, to_ns: int) -> None:
         """Remember an accepted closure."""

@@ -19,6 +19,7 @@ from objreg_ros.memory.store_file import SCHEMA_VERSION, StoreError
 
 DATA = Path(__file__).parent / "data" / "store_v5.db"  # written by the last code of that version
 LATER = DATA.with_name("store_v6.db")  # what the last code of version 6 made of it
+LAST = DATA.with_name("store_v7.db")  # what the last code of version 7 made of that
 
 
 def _old(folder: Path, changes: str = "", data: Path = DATA) -> Path:
@@ -29,7 +30,7 @@ def _old(folder: Path, changes: str = "", data: Path = DATA) -> Path:
     return path
 
 
-@pytest.mark.parametrize("data", [DATA, LATER])
+@pytest.mark.parametrize("data", [DATA, LATER, LAST])
 def test_an_older_store_says_all_that_it_said_of_its_one_robot(tmp_path: Path, data: Path) -> None:
     path = _old(tmp_path, data=data)
     for read_only in (True, False, True):
@@ -45,6 +46,7 @@ def test_an_older_store_says_all_that_it_said_of_its_one_robot(tmp_path: Path, d
                 (2, ("cup",), {"score": 0.5}),
                 (3, ("cup",), {"score": 0.5}),
             ]
+            assert opened.vetoes() == []
             assert [(c.robots, c.from_session) for c in opened.closures()] == [(("", ""), None)] * 3
         assert [p.name for p in tmp_path.iterdir()] == ["place.db"]
     assert path.read_bytes()[63] == SCHEMA_VERSION
@@ -55,6 +57,12 @@ def test_an_older_store_says_all_that_it_said_of_its_one_robot(tmp_path: Path, d
     [
         (DATA, "UPDATE closure SET to_ns = 9"),
         (LATER, "UPDATE closure SET to_session = 9"),
+        (LAST, "UPDATE keyframe SET session = 7"),
+        (LAST, "UPDATE scene SET view = x'00'"),
+        (LAST, "UPDATE cloud SET points = x'00'"),
+        (LAST, "UPDATE closure SET to_session = 9"),
+        (LAST, "DELETE FROM closure WHERE id = 1"),
+        (LAST, "UPDATE counters SET forgotten = 3"),
         *product(
             (DATA, LATER),
             (
@@ -123,10 +131,11 @@ STRANGE = {
     "CREATE VIEW v AS SELECT * FROM keyframe": "view v",
     "ALTER TABLE object ADD COLUMN more": "object more",
     "ALTER TABLE object DROP COLUMN density": "object density",
-    "PRAGMA user_version = 0": "expected schema version 5 to 7, got 0; it was left as it is. Use another path",
-    "PRAGMA user_version = 4": "expected schema version 5 to 7, got 4; .* with objreg_ros 0.2.0 first",
+    "PRAGMA user_version = 0": "expected schema version 5 to 8, got 0; it was left as it is. Use another path",
+    "PRAGMA user_version = 4": "expected schema version 5 to 8, got 4; .* with objreg_ros 0.2.0 first",
     "PRAGMA user_version = 6": "expected the tables of a store of version 6",
-    "PRAGMA user_version = 7": "one that no store has|another or none",
+    "PRAGMA user_version = 7": "expected the tables of a store of version 7",
+    "PRAGMA user_version = 8": "one that no store has|another or none",
 }
 
 

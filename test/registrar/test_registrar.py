@@ -15,6 +15,7 @@ from registration import rooms
 from registration.samples import SECOND, candidate, keyframe
 
 from objreg_ros.data.checked import Array
+from objreg_ros.data.closure_id import closure_id
 from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.data.frames import Frame
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
@@ -509,4 +510,28 @@ def test_keyframes_from_elsewhere_close_loops_and_are_taken_once_though_the_regi
     (closure,) = _arrived(registrar, 31.0, BESIDE, "robot2", "b").closures  # type: ignore[union-attr]
     assert closure.robots == ("robot1", "robot2")
     assert [stored.robots for stored in registrar._store.closures()] == [("robot1", "robot2")]
+    registrar.close()
+
+
+def test_what_a_person_withdrew_is_not_found_again_until_that_is_taken_back(tmp_path: Path) -> None:
+    store = tmp_path / "place.db"
+    registrar = Registrar(PARAMS.replaced(store=str(store), thin_seconds=0.1))
+    closures, _ = _run(registrar, _frame(0, HERE, True), _frame(1, AWAY, True), _frame(30, BESIDE, True))
+    ids = [closure_id(one, "r1") for one in closures]
+    with pytest.raises(ValueError, match="ids: expected those of stored closures, got nothing"):
+        registrar.veto([*ids, "nothing"], "r1")
+    vetoed = registrar.veto(ids, "r1")
+    assert vetoed.withdrawn == tuple(registrar.vetoed) and len(vetoed.withdrawn) == len(ids)
+    assert registrar.counts()["closures"] == 0 and registrar.counts()["vetoed"] == len(ids)
+    again, rejected = _run(registrar, _frame(32, BESIDE, True), _frame(33, AWAY, True))
+    assert [c for c in again if c.from_ns == 0 and c.to_ns >= 30 * SECOND] == []
+    assert Reason.VETOED in {one.reason for one in rejected}
+    registrar.close()
+    registrar = Registrar(PARAMS.replaced(store=str(store), thin_seconds=0.1))
+    assert len(registrar.vetoed) == len(ids)
+    back = registrar.undo_veto(ids, "r1")
+    assert [closure_id(one, "r1") for one in back.closures] == ids and registrar.vetoed == ()
+    assert registrar.counts()["closures"] >= len(ids) and registrar.counts()["vetoed"] == 0
+    with pytest.raises(ValueError, match="withdrawn closures"):
+        registrar.undo_veto(ids, "r1")
     registrar.close()

@@ -7,9 +7,7 @@ message gives None. What reads one takes its attributes only, so the messages of
 
 from __future__ import annotations
 
-import json
 import re
-import uuid
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +15,7 @@ import numpy as np
 
 from objreg_ros import limits
 from objreg_ros.bridge.messages import headers, motion_from_msg, to_msg
+from objreg_ros.data.closure_id import closure_id
 from objreg_ros.data.closures import LoopClosure, ObjectMatch, Observation, Reason, Rejected, Robots
 
 try:
@@ -26,18 +25,8 @@ try:
 except ImportError:  # optional: the topics of common_interfaces carry the poses
     LoopClosureMsg = Refusal = ObjectLandmarks = None
 
-NAMESPACE = uuid.UUID("5b0f7f86-7a43-4d0b-9c53-0a1de0f6b0c7")  # of the ids of closures
 NO_CLASS = 65535  # class_id of a label that has no number
 SESSION = re.compile("[0-9]{1,18}")
-
-
-def closure_id(closure: LoopClosure, robot: str) -> str:
-    """The text of a UUID: the same for the same two keyframes of the same robots, wherever and whenever it is made."""
-    here = closure.from_session, closure.from_frame_id, closure.from_ns
-    there = closure.to_session, closure.to_frame_id, closure.to_ns
-    robots = _robots(closure, robot)
-    whose = robots[0] if robots[0] == robots[1] else robots
-    return str(uuid.uuid5(NAMESPACE, json.dumps([whose, *here, *there])))
 
 
 def loop_closure(closure: LoopClosure, robot: str = "") -> Any:
@@ -59,6 +48,14 @@ def loop_closure(closure: LoopClosure, robot: str = "") -> Any:
     )
     message.pose.pose = to_msg.pose(closure.T_from_to)
     message.pose.covariance = closure.covariance.ravel()
+    return message
+
+
+def retraction(closure: LoopClosure, robot: str = "") -> Any:
+    """The message that withdraws a closure, with all that it said; None where objreg_msgs is not installed."""
+    message = loop_closure(closure, robot)
+    if message is not None:
+        message.retracted = True
     return message
 
 

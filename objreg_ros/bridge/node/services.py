@@ -5,15 +5,22 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
+from objreg_ros.bridge.messages import headers
 from objreg_ros.bridge.node.managed import ManagedNode
 
+try:
+    from objreg_msgs.srv import Veto
+except ImportError:  # optional: without a retraction no consumer could withdraw a closure
+    Veto = None
+
+MOST_VETOES = 1000  # ids of one call
 REST = 5.0  # times as long as a service worked it then rests
 
 
@@ -53,14 +60,18 @@ class ServingNode(ManagedNode):
         return future
 
     def serve_aside(self, name: str, work: Callable[[], tuple[bool, str]]) -> None:
-        """A service of std_srvs/Trigger: ``work`` is done `aside`, and says whether it could be, and what to know.
+        """A service of std_srvs/Trigger: ``work`` is done as by `serve_requests`."""
+        self.serve_requests(Trigger, name, lambda _: work())
+
+    def serve_requests(self, kind: Any, name: str, work: Callable[[Any], tuple[bool, str]]) -> None:
+        """A service whose answer is success and message: ``work`` is done `aside` with the request, and gives both.
 
         A call that comes while another one is answered is refused, and so is one that comes before the service has
         rested `REST` times as long as that took: whoever calls all the time holds up little of the rest.
         """
         in_hand, rested_s = threading.Lock(), 0.0
 
-        async def answer(_: Any, response: Any) -> Any:
+        async def answer(request: Any, response: Any) -> Any:
             nonlocal rested_s
             begun_s = time.monotonic()
             if begun_s < rested_s:
@@ -71,13 +82,31 @@ class ServingNode(ManagedNode):
                 response.success, response.message = False, f"{name}: call again: an earlier call is not done yet"
                 return response
             try:
-                response.success, response.message = await self.aside(work)
+                response.success, response.message = await self.aside(lambda: work(request))
             finally:
                 rested_s = time.monotonic() + REST * (time.monotonic() - begun_s)
                 in_hand.release()
             return response
 
-        self.create_service(Trigger, name, answer, callback_group=self.apart)
+        self.create_service(kind, name, answer, callback_group=self.apart)
+
+    def serve_vetoes(self, change: Callable[[Sequence[str], bool], tuple[bool, str]]) -> None:
+        """``~/veto`` where objreg_msgs is installed: ``change`` is called with ids and whether it is undone.
+
+        It says whether that is done, and what to know, as in `serve_requests`.
+        """
+
+        def answer(request: Any) -> tuple[bool, str]:
+            if len(request.ids) > MOST_VETOES:
+                return False, f"ids: expected at most {MOST_VETOES}, got {len(request.ids)}"
+            try:
+                ids = [headers.bounded(name, "id") for name in request.ids]
+            except ValueError as error:
+                return False, str(error)
+            return change(ids, bool(request.undo))
+
+        if Veto is not None:
+            self.serve_requests(Veto, "~/veto", answer)
 
     def serve_enable(self, inputs: str) -> None:
         """``~/enable`` of std_srvs/SetBool: whether ``inputs`` are used, as ``is_enabled``; a warning while not."""

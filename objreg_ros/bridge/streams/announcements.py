@@ -39,6 +39,7 @@ class Announcements:
         self._markers = node.create_publisher(MarkerArray, "markers", qos.latched())
         self._whole = _Whole(node) if closures_msg.LoopClosureMsg is not None else None
         self._published = Counter[bool]()  # constraints, by whether others confirmed them
+        self._withdrawn = 0
         self._refused, self._last_refusals = Counter[str](), dict[str, str]()  # by reason
         self._last_moved = dict[str, float]()  # m by label
 
@@ -55,6 +56,13 @@ class Announcements:
         if closures:
             name, now = self._node.get_fully_qualified_name(), self._node.get_clock().now().to_msg()
             self._acceptances.publish(acceptances(name, now, closures))
+
+    def retractions(self, closures: Sequence[LoopClosure]) -> None:
+        """Withdraw closures where objreg_msgs is installed: the other topics know of no retraction."""
+        self._withdrawn += len(closures)
+        if self._whole is not None:
+            for closure in closures:
+                self._whole.closures.publish(closures_msg.retraction(closure, self._robot))
 
     def refusals(self, rejected: Sequence[Rejected]) -> None:
         """Publish the refusals; nothing where there are none."""
@@ -91,6 +99,7 @@ class Announcements:
         return {
             "constraints": self._published.total(),
             "confirmed": self._published[True],
+            "withdrawn": self._withdrawn,
             "rejected": self._refused,
             "last_rejected": self._last_refusals,
             "last_moved": self._last_moved,

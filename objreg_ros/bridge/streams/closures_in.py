@@ -18,6 +18,7 @@ from nav_msgs.msg import Odometry
 from objreg_ros.bridge.messages import closures_msg, from_msg, headers
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.node_base import NodeBase
+from objreg_ros.data.closure_id import closure_id
 from objreg_ros.data.closures import LoopClosure, Moments, Robots, may_be_same, robot_of
 
 MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twice
@@ -27,7 +28,8 @@ class ClosuresIn:
     """The counters of ``node`` count closures. ValueError for `loop_closures` where objreg_msgs is not installed.
 
     ``take`` is given each accepted closure, ``again`` a known one that now names its sessions, ``withdraw`` the
-    `Moments` and robots of a retracted one. `forget_closure` lets a closure come once more. ``prefixes`` has what
+    `Moments` and robots of a retracted one, which is taken again when its id comes again. `forget_closure` lets a
+    closure come once more. ``prefixes`` has what
     precedes the topics of each robot.
     """
 
@@ -44,6 +46,7 @@ class ClosuresIn:
         self._robots = [robot for robot in prefixes if robot]
         self._known: dict[Moments, set[Robots]] = {}  # the oldest first
         self._by_id: dict[str, tuple[Moments, Robots]] = {}  # the id is that of objreg_msgs
+        self._retracted = set[str]()  # ids of these
         whole, kept = closures_msg.LoopClosureMsg, qos.latched(qos.KEPT_CONSTRAINTS)
         if topic == "loop_closures" and whole is None:
             raise ValueError("input: expected objreg_msgs, got none: build it with colcon, or set input:=constraints")
@@ -56,6 +59,7 @@ class ClosuresIn:
     def know(self, closures: Iterable[LoopClosure]) -> None:
         """These were taken before."""
         for closure in closures:
+            self._by_id.setdefault(closure_id(closure), (closure.moments, closure.robots))
             self._known.setdefault(closure.moments, set()).add(closure.robots)
 
     def forget_closure(self, closure: LoopClosure) -> None:
@@ -96,13 +100,19 @@ class ClosuresIn:
         if message.retracted:
             closed = self._by_id.get(message.id)
             if closed is not None and (not robot or robot in closed[1] or "" in closed[1]):
+                self._retracted.add(message.id)
                 self._withdraw(*closed)
             return
+        if message.id in self._retracted:
+            self._retracted.discard(message.id)
+            moments, robots = self._by_id[message.id]
+            self._known.get(moments, set()).discard(robots)
         closure = self._receive("loop_closures", message, lambda sent: self._of(robot, _whole(sent)))
         if closure is not None:
             self._by_id[message.id] = closure.moments, closure.robots
             while len(self._by_id) > MOST_KNOWN:
-                del self._by_id[next(iter(self._by_id))]
+                self._retracted.discard(oldest := next(iter(self._by_id)))
+                del self._by_id[oldest]
 
     def _is_known(self, closure: LoopClosure) -> bool:
         return any(may_be_same(closure.robots, robots) for robots in self._known.get(closure.moments, ()))
