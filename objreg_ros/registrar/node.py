@@ -284,10 +284,8 @@ class RegistrarNode(FramesNode):
         except (ValueError, OSError) as error:
             return False, str(error)
         self._publish(outcome)
-        return (
-            True,
-            f"{'brought back' if undo else 'withdrew'} {len(outcome.closures or outcome.withdrawn)} constraints",
-        )
+        done = f"brought back {len(outcome.closures)}" if undo else f"withdrew {len(outcome.withdrawn)}"
+        return True, f"{done} constraints"
 
     def shut(self) -> None:
         """End both workers, the search in hand early, store what they had not come to, let go of the store."""

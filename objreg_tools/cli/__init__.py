@@ -39,6 +39,7 @@ SUMMARIES = {
     "watch": "Show a running graph on a page of this machine.",
     "metrics": "Serve the counters of a running graph for Prometheus.",
     "convert": "Write any recording as rosbag2.",
+    "veto": "Withdraw closures of a store that are wrong, or undo that.",
     "export": "Write the objects of a store as PLY and JSON.",
     "simulate": "Make a recording with exact ground truth.",
     "fetch-model": "Get a detector model.",

@@ -21,6 +21,7 @@ from objreg_ros.registrar.candidate_search import Budget, Means, Pools, Search
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.thinning import Thinning
+from objreg_ros.registrar.vetoes import Vetoes
 from objreg_ros.registration.candidate import Candidate
 
 PARAMS = RegistrarParams(threads=1, closures=2, candidates=3, thin_seconds=1.0, confirm_seconds=0.0)
@@ -59,7 +60,7 @@ def means() -> Iterator[Means]:
         stored = keyframe(number, seconds, CUPS)
         store.write_keyframe(stored, sightings_of(stored))
     with ThreadPoolExecutor(1) as pool:
-        yield Means(store, Recorded(), refuse, Confirmation(PARAMS), pool)
+        yield Means(store, Recorded(), refuse, Confirmation(PARAMS), pool, Vetoes())
     store.close()
 
 

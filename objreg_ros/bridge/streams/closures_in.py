@@ -29,8 +29,7 @@ class ClosuresIn:
 
     ``take`` is given each accepted closure, ``again`` a known one that now names its sessions, ``withdraw`` the
     `Moments` and robots of a retracted one, which is taken again when its id comes again. `forget_closure` lets a
-    closure come once more. ``prefixes`` has what
-    precedes the topics of each robot.
+    closure come once more. ``prefixes`` has what precedes the topics of each robot.
     """
 
     def __init__(

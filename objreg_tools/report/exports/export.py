@@ -14,6 +14,7 @@ import numpy as np
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closure_fields import fields_of
+from objreg_ros.data.closure_id import closure_id
 from objreg_ros.geometry import rotate, transform
 from objreg_ros.memory.landmarks import Landmark, Landmarks
 from objreg_ros.memory.sighting import Sighting
@@ -34,7 +35,8 @@ def export(path: str | Path, folder: str | Path, notify: Callable[[str], None] =
     ``contexts/keyframe_<id>.ply`` what was around it, both in m in the frame of the session. Their points are doubles,
     since that frame may be UTM's, where a float steps by half a metre. ``map.json`` holds keyframes with their objects
     (``frames`` is how many showed one, ``density`` in points per square metre of it), the landmarks that those are of,
-    closures, and the ids of the keyframes that are ``damaged``: they are left out, and ``notify`` receives the reason.
+    closures, those that a person ``vetoed``, and the ids of the keyframes that are ``damaged``: they are left out, and
+    ``notify`` receives the reason.
     StoreError (an OSError) if it is no store, OSError if there is anything in the folder already or it cannot be
     written: then nothing of the export remains.
     """
@@ -64,7 +66,9 @@ def _write(store: Store, folder: Path, notify: Callable[[str], None]) -> Iterato
         seen += sightings
     landmarks = [_landmark_json(known) for known in Landmarks(RegistrarParams(), seen).known()]
     closures = [fields_of(closure) for closure in store.closures()]
-    content = {"keyframes": keyframes, "landmarks": landmarks, "closures": closures, "damaged": damaged}
+    vetoed = [{"id": closure_id(veto.closure), **fields_of(veto.closure)} for veto in store.vetoes()]
+    content = {"keyframes": keyframes, "landmarks": landmarks, "closures": closures, "vetoed": vetoed}
+    content["damaged"] = damaged
     yield _write_json(folder / "map.json", content)
 
 

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command that registers a pair of a run once more, as it may be pasted."""
+"""The commands that register a pair of a run once more, and that withdraw its closure, as they may be pasted."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
+
+from objreg_ros.data.closure_id import closure_id
+from objreg_ros.data.closures import LoopClosure, Rejected
 
 PASSED_ON = ("--model", "--labels", "--camera", "--params", "--set", "--remap", "--detections")
 
@@ -24,6 +27,16 @@ def pair_command(summary: Mapping[str, Any], first_s: float, second_s: float) ->
         words = []
     times = f"{first_s:.3f}", f"{second_s:.3f}"
     return shlex.join(["objreg", "pair", recording, *times, "--keyframes", *_passed_on(words)])
+
+
+def veto_command(summary: Mapping[str, Any], outcome: LoopClosure | Rejected) -> str:
+    """`objreg veto` for a closure of a run, in its store, or in one that is still to be named.
+
+    Empty for a refusal: there is nothing to withdraw.
+    """
+    if not isinstance(outcome, LoopClosure):
+        return ""
+    return shlex.join(["objreg", "veto", summary.get("store") or "STORE", closure_id(outcome)])
 
 
 def _passed_on(words: Sequence[str]) -> Iterator[str]:

@@ -13,7 +13,7 @@ from objreg_ros.data.closures import UNTRIED
 from objreg_tools.report.closures.matched_objects import Drawn, pair_drawing
 from objreg_tools.report.closures.weighed_evidence import EVIDENCE, weighed
 from objreg_tools.report.packed import zipped
-from objreg_tools.report.pair.pair_command import pair_command
+from objreg_tools.report.pair.pair_command import pair_command, veto_command
 from objreg_tools.report.run import clouds, figures, thumbnails
 from objreg_tools.report.run.camera_map import of_one_clock
 from objreg_tools.report.run.clouds import Clouds
@@ -306,6 +306,7 @@ def _pane(pair: PairRow, thumbs: Thumbnails) -> View:
         "meaning": MEANINGS.get(pair.reason, ""),
         "text": pair.text,
         "command": pair_command(pair.run.summary, *pair.seconds) if pair.tried else "",
+        "veto": veto_command(pair.run.summary, pair.outcome),
         "evidence": [(row.key, row.value, _rounded(row.weight)) for row in evidence.readings],
         "total": _rounded(evidence.total),
         "least": _rounded(evidence.least),

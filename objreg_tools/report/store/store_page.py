@@ -15,7 +15,7 @@ from objreg_tools.report.page import environment
 from objreg_tools.report.run.pictures import picture_uri
 from objreg_tools.report.store.dot_names import Dot, placed
 from objreg_tools.report.store.session_map import MapPlace, SessionMap, session_maps
-from objreg_tools.report.store.store_summary import StoreSummary, moves_as_text
+from objreg_tools.report.store.store_summary import StoreSummary, moves_as_text, vetoes_as_text
 from objreg_tools.report.store.tied_map import TiedMap, tied_maps
 
 SERIES = 7  # colours of the page before grey
@@ -32,6 +32,7 @@ def store_page(found: StoreSummary, pictures: Mapping[int, Array]) -> str:
     return environment().get_template("store.html.j2").render(
         found=found,
         moves=moves_as_text(found),
+        vetoes=vetoes_as_text(found),
         legend=[(styles[label], f"{label} ({count})") for label, count in found.labels.items()],
         sessions=[
             {**session, "drawing": {name: _drawn(one, styles, name) for name in WIDTHS}}

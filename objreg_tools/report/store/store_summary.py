@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from objreg_ros.data.closure_id import closure_id
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.landmarks import Landmark, Landmarks
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store, StoreError
@@ -33,6 +35,7 @@ class StoreSummary:
     sightings: tuple[Sighting, ...]
     moves: Moves
     ties: tuple[SessionTie, ...]
+    vetoed: tuple[LoopClosure, ...]  # that a person withdrew, the oldest veto first
     depth_noise: float | None  # median of the views, in that of a Kinect v1; None where none has enough depth
 
     @property
@@ -94,6 +97,7 @@ def survey(path: str | Path) -> StoreSummary:
             sightings=sightings,
             moves=moves_in(store, sightings),
             ties=ties_in(store, sightings),
+            vetoed=tuple(veto.closure for veto in store.vetoes()),
             depth_noise=_depth_noise(store),
         )
     finally:
@@ -132,8 +136,18 @@ def describe(found: StoreSummary) -> str:
         )
     for group in joined(found.ties):
         lines.append(f"  tied together by constraints: sessions {', '.join(map(str, group))}")
+    lines += [f"  vetoed: {sentence}" for sentence in vetoes_as_text(found)]
     lines += [f"  moved: {sentence}" for sentence in moves_as_text(found)]
     return "\n".join(lines)
+
+
+def vetoes_as_text(found: StoreSummary) -> list[str]:
+    """The closures that a person withdrew, a line each: id, moments and labels."""
+    return [
+        f"{closure_id(one)} from {1e-9 * one.from_ns:.3f} s of session {one.from_session} to "
+        f"{1e-9 * one.to_ns:.3f} s of session {one.to_session}, {', '.join(one.labels)}"
+        for one in found.vetoed
+    ]
 
 
 def moves_as_text(found: StoreSummary) -> list[str]:

@@ -141,8 +141,8 @@ function browse(article) {
   }
 
   // Without a secure page, as of file://, some browsers have no clipboard: then the command is selected.
-  function showCommand(command) {
-    const again = part(".again"), code = again.querySelector("code"), button = again.querySelector("button");
+  function showCommand(where, command) {
+    const again = part(where), code = again.querySelector("code"), button = again.querySelector("button");
     again.hidden = !command;
     code.textContent = command;
     button.textContent = "copy";
@@ -165,7 +165,8 @@ function browse(article) {
     picture(part(".over"), data.overlays[key]);
     part(".blind").hidden = Boolean(data.moments[pair.from] || data.moments[pair.to]);
     listEvidence(pair);
-    showCommand(pair.command);
+    showCommand(".again", pair.command);
+    showCommand(".veto", pair.veto);
     for (const link of article.querySelectorAll("[data-of]")) link.classList.toggle("chosen", link.dataset.of === key);
     if (!pane.open) pane.showModal();
     const space = part(".space");

@@ -3,7 +3,11 @@ from __future__ import annotations
 
 import shlex
 
-from objreg_tools.report.pair.pair_command import pair_command
+import numpy as np
+
+from objreg_ros.data.closure_id import closure_id
+from objreg_ros.data.closures import LoopClosure, Reason, refused
+from objreg_tools.report.pair.pair_command import pair_command, veto_command
 
 RUN = "objreg offline 'my rec' --model=coco.onnx --set detector.threshold=0.4 --odometry none --json run.json"
 
@@ -18,3 +22,11 @@ def test_a_run_that_names_no_recording_has_no_command_and_an_old_one_has_no_opti
     assert pair_command({}, 1.0, 2.0) == ""
     old = [{"recording": "rec"}, {"recording": "rec", "about": {"command": "objreg 'never closed"}}]
     assert {pair_command(summary, 1.0, 2.0) for summary in old} == {"objreg pair rec 1.000 2.000 --keyframes"}
+
+
+def test_a_closure_may_be_withdrawn_in_the_store_of_the_run_and_a_refusal_may_not() -> None:
+    closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",))
+    name = closure_id(closure)
+    assert veto_command({"store": "/my place.db"}, closure) == f"objreg veto '/my place.db' {name}"
+    assert veto_command({"store": ""}, closure) == veto_command({}, closure) == f"objreg veto STORE {name}"
+    assert veto_command({}, refused(closure, Reason.TEXTURE, "")) == ""
