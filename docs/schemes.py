@@ -180,6 +180,12 @@ SCHEMES = {
         *(arrow(x, 104, x, 44, EARLIER) for x in (80, 140, 320)), arrow(240, 106, 120, 42, WRONG),
         words(200, 140, "the keyframes around it support another pose"),
     ),
+    "vetoed": picture(
+        line([(60, 40), (160, 35), (260, 40), (340, 35)], EARLIER),
+        line([(60, 110), (160, 105), (260, 110), (340, 105)], NEW),
+        arrow(160, 104, 260, 44, WRONG), arrow(180, 106, 280, 42, WRONG),
+        words(200, 140, "a person withdrew this pose, or that of a neighbour"),
+    ),
 }  # fmt: skip
 
 DROPS = {

@@ -150,6 +150,12 @@ REFUSALS = {
         ("registrar.confirm_seconds",),
         (("registrar/confirmation.py", "OPPOSED_SHARE"),),
     ),
+    "vetoed": ReasonText(
+        "a person withdrew this constraint, or a neighbouring one whose pose agrees",
+        "Nothing is wrong. `objreg veto STORE ID --undo`, or `~/veto` with `undo`, lets it hold again.",
+        (),
+        (("registrar/consistency.py", "REACH_M"),),
+    ),
     "camera_implausible": ReasonText(
         "the camera, or the scale of its depth, differs from what the stream states",
         "The detail gives the measured and the stated value. Correct camera_info, or set the camera.",

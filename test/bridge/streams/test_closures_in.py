@@ -89,6 +89,24 @@ def test_equal_moments_of_two_robots_are_two_closures_and_one_is_taken_back() ->
     assert [told.robots for told in hearer.taken[2:]] == [("a", "a")]
 
 
+def test_what_was_taken_back_is_taken_again_when_its_id_comes_again() -> None:
+    hearer, message = Hearer(), whole(CLOSURE, "a")
+    for retracted in (False, True, False, False, True, False):
+        message.retracted = retracted
+        hearer.received["loop_closures"](message)
+        hearer.received["constraints"](to_msg.constraint(CLOSURE))
+    assert len(hearer.taken) == 3 and len(hearer.withdrawn) == 2
+
+
+def test_what_was_known_before_a_restart_is_taken_back_by_its_id() -> None:
+    hearer, message = Hearer(), whole(CLOSURE, "a")
+    hearer.closures.know([replace(CLOSURE, from_robot="a", to_robot="a")])
+    message.id = closures_msg.closure_id(replace(CLOSURE, from_robot="a", to_robot="a"))
+    message.retracted = True
+    hearer.received["loop_closures"](message)
+    assert hearer.withdrawn == [(CLOSURE.moments, ("a", "a"))]
+
+
 def test_the_topic_of_a_robot_names_it() -> None:
     hearer = Hearer("constraints", ("a", "b"))
     assert set(hearer.received) == {"constraints", "a/constraints", "b/constraints"}

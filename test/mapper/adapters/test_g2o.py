@@ -61,6 +61,12 @@ def test_a_retraction_takes_the_edge_out_of_the_file_again(around: Callable[...,
     graph.whole.publish(message)
     graph.wait(lambda: not edges(path))
     assert node.accounting.balance().published == 1 and by_key(*node.own_diagnostics())["retracted too late"] == 0
+    message.retracted = False
+    graph.whole.publish(message)
+    graph.wait(lambda: edges(path))
+    graph.whole.publish(message)
+    graph.wait(lambda: by_key(*node.own_diagnostics())["repeated"] == 2)
+    assert len(edges(path)) == 1
 
 
 def test_odometry_that_begins_anew_begins_another_file(around: Callable[..., Any], tmp_path: Path) -> None:
