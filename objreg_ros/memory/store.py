@@ -183,6 +183,10 @@ class Store:
         heads = self._heads.values()
         return next((h["id"] for h in heads if h["session"] == session and h["stamp_ns"] == stamp_ns), None)
 
+    def keyframes_at(self, stamp_ns: int) -> list[int]:
+        """The ids of the keyframes at a stamp, of whatever session, the oldest first."""
+        return [head["id"] for head in self._heads.values() if head["stamp_ns"] == stamp_ns]
+
     def stand_at(self, session: int | None, stamp_ns: int) -> Stand | None:
         """Where the keyframe of a session at a stamp stood; None where there is none, or it is damaged."""
         number = self.keyframe_at(session, stamp_ns)

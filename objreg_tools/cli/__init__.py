@@ -40,6 +40,7 @@ SUMMARIES = {
     "metrics": "Serve the counters of a running graph for Prometheus.",
     "convert": "Write any recording as rosbag2.",
     "veto": "Withdraw closures of a store that are wrong, or undo that.",
+    "accept": "Write a closure of two keyframes of a store that a person knows to be right.",
     "export": "Write the objects of a store as PLY and JSON.",
     "simulate": "Make a recording with exact ground truth.",
     "fetch-model": "Get a detector model.",
