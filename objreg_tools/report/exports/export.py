@@ -67,8 +67,13 @@ def _write(store: Store, folder: Path, notify: Callable[[str], None]) -> Iterato
     landmarks = [_landmark_json(known) for known in Landmarks(RegistrarParams(), seen).known()]
     closures = [fields_of(closure) for closure in store.closures()]
     vetoed = [{"id": closure_id(veto.closure), **fields_of(veto.closure)} for veto in store.vetoes()]
-    content = {"keyframes": keyframes, "landmarks": landmarks, "closures": closures, "vetoed": vetoed}
-    content["damaged"] = damaged
+    content = {
+        "keyframes": keyframes,
+        "landmarks": landmarks,
+        "closures": closures,
+        "vetoed": vetoed,
+        "damaged": damaged,
+    }
     yield _write_json(folder / "map.json", content)
 
 
