@@ -24,7 +24,7 @@ def command(store: Path, ids: tuple[str, ...], undo: bool, robot: str) -> None:
     """Withdraw the closures of STORE that have these ids: a person knows that they are wrong.
 
     They are not found again: neither the same two keyframes, nor neighbours of the same two revisits at the same pose.
-    All are withdrawn, or none where one is not known. A registrar that starts on STORE tells its mapper. No registrar
+    All are withdrawn, or none where one is not known. A registrar that starts on STORE retracts them. No registrar
     may hold STORE meanwhile: one that runs has the service ~/veto. Ids are those on `loop_closures`, and of `objreg
     report`.
     """
