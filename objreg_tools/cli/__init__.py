@@ -23,6 +23,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from objreg_ros.native import UnbuiltError
 from objreg_ros.whole_file import unwritten
 from objreg_tools.cli import verbosity
 
@@ -52,6 +53,7 @@ SUMMARIES = {
 FOLDER = Path(__file__).parent / "commands"
 NAME = "objreg"
 BROKEN, NOTHING, INTERRUPTED, UNHEARD, TERMINATED = 1, 3, 130, 141, 143  # nothing: what was read gave no frame
+BROKEN_INPUT = OSError, ValueError, UnbuiltError  # or kernels that are not built: one line, no traceback
 AGAIN_S = 0.05  # after which an interrupt that was swallowed comes again
 
 
@@ -92,7 +94,7 @@ class LazyGroup(click.Group):
         except BrokenPipeError:
             _leave_output()
             ctx.exit(UNHEARD)
-        except (OSError, ValueError) as error:
+        except BROKEN_INPUT as error:
             if verbosity.is_verbose():
                 traceback.print_exception(error)
             raise
@@ -126,9 +128,10 @@ verbosity.received_by(group)
 
 
 def main(*arguments: Any) -> None:
-    """The executable. A broken input is one line on stderr and exit 1; anything else is a bug and has a traceback.
+    """The executable. A broken input is one line on stderr and exit 1, as are kernels that are not built.
 
-    A run of which no frame got through ends with 3, as does the inspection of what the graph cannot run on.
+    Anything else is a bug and has a traceback. A run of which no frame got through ends with 3, as does the inspection
+    of what the graph cannot run on.
 
     SIGINT, SIGTERM and a reader of the output who has left end what was begun, with the usual status.
     """
@@ -143,7 +146,7 @@ def main(*arguments: Any) -> None:
     except BrokenPipeError:
         _leave_output()
         sys.exit(UNHEARD)
-    except (OSError, ValueError) as error:
+    except BROKEN_INPUT as error:
         click.echo(f"objreg: {' '.join(str(_named(error)).split())}", err=True)
         sys.exit(BROKEN)
     except (KeyboardInterrupt, click.Abort):

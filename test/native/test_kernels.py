@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import os
 import re
 import shutil
 import subprocess
@@ -146,6 +147,44 @@ def test_kernels_of_other_sources_are_refused_with_the_command_that_builds_them(
     for built in (tmp_path / "objreg_ros/native").glob("*.so"):
         built.unlink()
     assert "got none: run" in complaint() and "g++" in complaint()
+
+
+@pytest.fixture(scope="module")
+def unbuilt(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A checkout in which nothing was compiled."""
+    folder = tmp_path_factory.mktemp("unbuilt")
+    for package in ("objreg_ros", "objreg_mapper", "objreg_tools"):
+        shutil.copytree(repository / package, folder / package, ignore=shutil.ignore_patterns("*.so", "__pycache__"))
+    return folder
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("objreg_tools", "offline", "recording"),
+        ("objreg_tools", "try", "--help"),
+        ("objreg_tools.graph",),
+        ("objreg_ros.detector.node",),
+        ("objreg_ros.registrar.node",),
+    ],
+)
+def test_whoever_starts_without_kernels_reads_one_line_with_the_command_that_builds_them(
+    words: tuple[str, ...], unbuilt: Path
+) -> None:
+    if words[0] != "objreg_tools":
+        pytest.importorskip("rclpy", reason="ROS is not installed")
+    command = [sys.executable, "-m", *words]
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "OBJREG_CHECKED")}
+    done = subprocess.run(command, cwd=unbuilt, env=environment, capture_output=True, text=True)
+    line = " ".join(done.stderr.split())
+    assert done.returncode == 1 and not done.stdout and done.stderr.count("\n") == 1, done.stderr
+    assert "expected the kernels' build" in line and f"run {native.BUILD} in {unbuilt}" in line
+
+
+def test_other_errors_keep_their_traceback_beside_kernels_that_are_not_built(unbuilt: Path) -> None:
+    code = "from objreg_ros import native\ntry:\n    native.kernels('rvl')\nexcept ImportError:\n    raise KeyError(1)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=unbuilt, env={}, capture_output=True, text=True)
+    assert done.returncode == 1 and "Traceback" in done.stderr and "KeyError: 1" in done.stderr
 
 
 def test_a_build_is_marked_with_names_and_contents_of_its_sources(tmp_path: Path) -> None:
