@@ -22,6 +22,7 @@ from objreg_tools.cli.verbosity import aside, is_verbose
 from objreg_tools.offline.run import Run
 from objreg_tools.report.closures.closed_revisits import ClosedRevisits
 from objreg_tools.report.run.findings import Counts, verdict
+from objreg_tools.report.words import number_of
 
 STILL = "all frames have the stamp {} ns, so none closes a loop: record them again with the time in their headers"
 
@@ -103,8 +104,8 @@ def print_memory(summary: Mapping[str, Any]) -> None:
 
 
 def _held(counts: Mapping[str, int]) -> str:
-    names = ("sessions", "keyframes", "landmarks", "closures")
-    return ", ".join(f"{counts[name]} {name}" for name in names if name in counts)
+    nouns = ("session", "keyframe", "landmark", "closure")
+    return ", ".join(number_of(counts[f"{noun}s"], noun) for noun in nouns if f"{noun}s" in counts)
 
 
 @aside()
@@ -117,8 +118,8 @@ def print_trajectory(trajectory: Mapping[str, Any] | None) -> None:
     click.echo(f"  trajectory ({trajectory['of']}): {trajectory['frames']} frames{tied}")
     if apart:
         click.echo(
-            f"  trajectory: {trajectory['frames_apart']} frames in {apart} more sessions are left out: the track was "
-            "lost between, and no closures tie them to it"
+            f"  trajectory: {trajectory['frames_apart']} frames in {number_of(apart, 'more session')} are left out: "
+            "the track was lost between, and no closures tie them to it"
         )
     error = trajectory["error_cm"]
     if error is not None:

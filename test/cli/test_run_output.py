@@ -43,7 +43,7 @@ def test_a_store_and_the_place_in_its_map_are_lines_and_without_them_there_is_no
 ) -> None:
     print_memory(memory("/a.db", 7, {"session": 0, "first_ns": 5}))
     print_memory(memory("/a.db", 7, None))
-    held = "  store /a.db: 1 sessions, 7 keyframes; now 1 sessions, 7 keyframes"
+    held = "  store /a.db: 1 session, 7 keyframes; now 1 session, 7 keyframes"
     assert capsys.readouterr().out.splitlines() == [
         held, "  relocalised in the map of session 0 from the frame of 5 ns on; in the end: why",
         held, "  not relocalised: why",

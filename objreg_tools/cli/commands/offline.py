@@ -29,6 +29,7 @@ from objreg_tools.cli.settings import print_ignored
 from objreg_tools.offline.run import Run
 from objreg_tools.recording.troubles import troubles
 from objreg_tools.report.exports.map_files import VOXEL_M
+from objreg_tools.report.pair.pair_command import OF_RUN, passed_on
 from objreg_tools.report.run.findings import as_json, find, verdict
 from objreg_tools.report.run.pictures import Album
 from objreg_tools.report.run.run_summary import RunSummary
@@ -109,4 +110,5 @@ def _say_what_follows(recording: Path, json_file: Path | None) -> None:
     """The command that shows the closed loops, unless this run is part of that already."""
     asked = click.get_current_context().find_root().invoked_subcommand
     if asked != "report" and json_file != STANDARD_OUTPUT:
-        print_next("objreg", "report", str(json_file or recording))
+        again = [str(json_file)] if json_file else [str(recording), *passed_on(sys.argv[1:], OF_RUN)]
+        print_next("objreg", "report", *again)

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands that register a pair of a run once more, and that withdraw its closure, as they may be pasted."""
+"""Commands that go on from a run, or withdraw a closure of it, as they may be pasted."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from objreg_ros.data.closure_id import closure_id
 from objreg_ros.data.closures import LoopClosure, Rejected
 
 PASSED_ON = ("--model", "--labels", "--camera", "--params", "--set", "--remap", "--detections")
+OF_RUN = (*PASSED_ON, "--odometry", "--max-frames")  # of what runs a whole recording
 
 
 def pair_command(summary: Mapping[str, Any], first_s: float, second_s: float) -> str:
@@ -26,7 +27,7 @@ def pair_command(summary: Mapping[str, Any], first_s: float, second_s: float) ->
     except ValueError:  # no command of ours
         words = []
     times = f"{first_s:.3f}", f"{second_s:.3f}"
-    return shlex.join(["objreg", "pair", recording, *times, "--keyframes", *_passed_on(words)])
+    return shlex.join(["objreg", "pair", recording, *times, "--keyframes", *passed_on(words)])
 
 
 def veto_command(summary: Mapping[str, Any], outcome: LoopClosure | Rejected) -> str:
@@ -39,11 +40,11 @@ def veto_command(summary: Mapping[str, Any], outcome: LoopClosure | Rejected) ->
     return shlex.join(["objreg", "veto", summary.get("store") or "STORE", closure_id(outcome)])
 
 
-def _passed_on(words: Sequence[str]) -> Iterator[str]:
-    """The options that `objreg pair` has too, with their values."""
+def passed_on(words: Sequence[str], names: Collection[str] = PASSED_ON) -> Iterator[str]:
+    """Those words of a command line that are options of these ``names``, with their values."""
     for k, word in enumerate(words):
         name, sign, _ = word.partition("=")
-        if name in PASSED_ON and sign:
+        if name in names and sign:
             yield word
-        elif name in PASSED_ON:
+        elif name in names:
             yield from words[k : k + 2]

@@ -222,7 +222,8 @@ def _pieces(run: RunSummary) -> str:
     text += f"closures tie out of {known.sessions} sessions." if known.sessions > 1 else "are of one session."
     if not known.sessions_apart:
         return text
-    return f"{text} {known.frames_apart} frames in {known.sessions_apart} more sessions are not: nothing ties them."
+    apart = number_of(known.sessions_apart, "more session")
+    return f"{text} {known.frames_apart} frames in {apart} are not: nothing ties them."
 
 
 def _timeline(run: RunSummary) -> View | None:

@@ -194,7 +194,7 @@ def test_a_store_is_named_with_what_it_held_and_whether_the_camera_is_in_its_map
     words = (folder, "--model", model, "--json", file, "--set", f"registrar.store={tmp_path / 'place.db'}")
     first, second = offline(*words), offline(*words)
     assert f"store {tmp_path / 'place.db'}: 0 sessions, 0 keyframes" in first and "relocalised" not in first
-    assert "place.db: 1 sessions, 2 keyframes" in second
+    assert "place.db: 1 session, 2 keyframes" in second
     assert "not relocalised: no closure to an earlier session yet" in second
     summary = json.loads(file.read_text())
     assert summary["store"] == str(tmp_path / "place.db") and summary["stored"]["before"]["sessions"] == 1

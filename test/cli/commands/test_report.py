@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from recording.sample_folders import tum_folder
+from recording.vision import detected_bag
 
 from objreg_tools.cli import group
 from objreg_tools.cli.commands.report import command
@@ -29,3 +30,18 @@ def test_a_page_that_cannot_be_written_is_refused_before_anything_runs(
         words = ["report", str(recording), "--out", str(tmp_path / "nowhere/x.html")]
         CliRunner().invoke(group, words, catch_exceptions=False, standalone_mode=False)
     assert not (tmp_path / "nowhere").exists()
+
+
+def test_a_recording_is_run_with_the_detections_that_it_holds(tmp_path: Path) -> None:
+    bag, page = detected_bag(tmp_path / "bag"), tmp_path / "out.html"
+    words = [str(bag), "--detections", "/yolo/detections", "--max-frames", "3", "--out", str(page)]
+    done = CliRunner().invoke(command, words, catch_exceptions=False)
+    assert done.exit_code == 0 and "3 frames, 3 detections" in done.output
+    assert "mug" in page.read_text(encoding="utf-8")
+
+
+def test_options_of_a_run_are_refused_where_all_runs_are_done(tmp_path: Path) -> None:
+    run = tmp_path / "run.json"
+    run.touch()
+    with pytest.raises(ValueError, match="expected a recording that is run with these options, got runs that are done"):
+        CliRunner().invoke(command, [str(run), "--detections", "/yolo/detections"], catch_exceptions=False)

@@ -7,7 +7,7 @@ import numpy as np
 
 from objreg_ros.data.closure_id import closure_id
 from objreg_ros.data.closures import LoopClosure, Reason, refused
-from objreg_tools.report.pair.pair_command import pair_command, veto_command
+from objreg_tools.report.pair.pair_command import OF_RUN, pair_command, passed_on, veto_command
 
 RUN = "objreg offline 'my rec' --model=coco.onnx --set detector.threshold=0.4 --odometry none --json run.json"
 
@@ -30,3 +30,8 @@ def test_a_closure_may_be_withdrawn_in_the_store_of_the_run_and_a_refusal_may_no
     assert veto_command({"store": "/my place.db"}, closure) == f"objreg veto '/my place.db' {name}"
     assert veto_command({"store": ""}, closure) == veto_command({}, closure) == f"objreg veto STORE {name}"
     assert veto_command({}, refused(closure, Reason.TEXTURE, "")) == ""
+
+
+def test_what_runs_a_whole_recording_again_has_its_odometry_too() -> None:
+    options = ["--model=coco.onnx", "--set", "detector.threshold=0.4", "--odometry", "none"]
+    assert [*passed_on(shlex.split(RUN), OF_RUN)] == options

@@ -144,7 +144,7 @@ def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_str
 def test_our_own_tracking_is_drawn_corrected_with_what_of_it_is_left_out() -> None:
     lost = tracked(begins=45)
     lost["constraints"] = []
-    for told, words in ((tracked(), "120 of 120 frames"), (lost, "45 frames in 1 more sessions are not: nothing ties")):
+    for told, words in ((tracked(), "120 of 120 frames"), (lost, "45 frames in 1 more session are not: nothing ties")):
         way = view(told)["trajectory"]
         assert words in way["text"] and "There is no odometry" in way["text"]
         assert ("tracked", "our own tracking") in way["legend"] and ("corrected", "corrected") in way["legend"]
