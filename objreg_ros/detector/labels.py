@@ -23,7 +23,7 @@ ENDS = (".txt", ".names", ".yaml", ".yml")
 """How the file of labels beside a model may end, behind the model's own name."""
 
 LABEL_MAP = "labelmap.txt"
-REMEDY = "name a file of one label a line with `labels`"
+REMEDY = "name a file of one label a line with `labels` (of a command: --labels)"
 IS_YAML = re.compile(r"\A\s*[\[{]|^names\s*:|\A(#.*\n|\s)*(- |0\s*:\s)", re.MULTILINE)
 """What YAML begins with or has: ``names:``, a list, or class numbers."""
 

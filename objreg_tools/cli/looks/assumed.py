@@ -8,6 +8,7 @@ from typing import Any
 from objreg_ros import share
 from objreg_ros.bridge.messages import camera_from_msg
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.detector.threshold import own_threshold
 from objreg_tools.cli.recorded import Opened
 from objreg_tools.offline.run import Run
 from objreg_tools.recording.camera_from_text import GIVEN
@@ -84,13 +85,14 @@ def _model(opened: Opened) -> str:
     if opened.recorded is not None:
         return f"none: detections as recorded on {opened.recorded.topic}"
     detector = opened.asked.settings.of("detector", DetectorParams)
-    name = share.model(detector.model).name
+    model = share.model(detector.model)
+    name = model.name
     if detector.model != share.AUTO:
         why = "as asked for"
     else:
         is_embedded = name == share.EMBEDDED
         why = "trained in simulation, as no other is installed" if is_embedded else "of COCO, as it is installed"
-    return f"{name}, {why}; scores from {detector.threshold:g} on"
+    return f"{name}, {why}; scores from {detector.threshold or own_threshold(model):g} on"
 
 
 def _odometry(opened: Opened) -> str:

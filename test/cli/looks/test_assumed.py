@@ -41,6 +41,8 @@ def test_the_model_is_named_with_why_it_was_taken(tmp_path: Path) -> None:
     folder = tum_folder(tmp_path / "tum")
     asked = rows(folder, ("detector.model=objreg_ssd.onnx", "detector.threshold=0.3"))
     assert asked["model"] == "objreg_ssd.onnx, as asked for; scores from 0.3 on"
+    its_own = rows(folder, ("detector.model=objreg_ssd.onnx",))
+    assert its_own["model"].endswith("scores from 0.5 on")
 
 
 def test_of_a_bag_topics_and_the_unit_of_depth_are_named(tmp_path: Path) -> None:
