@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Six users walk through what there is, each by what the last command said, and none comes to a dead end."""
+"""Users walk through what there is, each by what the last command said, and none comes to a dead end."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from report.chromium import chromium
 
-from . import many, odd_bags, reader, researcher, student, trying
+from . import many, odd_bags, own_detector, programmer, reader, realsense, researcher, student, trying, twenty
 from .walk import ROOM, Said, Walk
 
 pytestmark = pytest.mark.ros
@@ -49,6 +49,23 @@ def browser() -> Iterator[Any]:
 
 def test_a_student_comes_from_a_tum_folder_to_a_page(room: Path, tmp_path: Path) -> None:
     student.walk(tmp_path, room)
+
+
+def test_a_bag_of_a_realsense_without_odometry_needs_no_option(room: Path, tmp_path: Path) -> None:
+    realsense.walk(tmp_path, room)
+
+
+def test_a_programmer_types_the_lines_of_the_readme_over_pictures_of_their_own(room: Path, tmp_path: Path) -> None:
+    programmer.walk(tmp_path, room)
+
+
+@pytest.mark.parametrize("way", [own_detector.recorded_detections, own_detector.own_model])
+def test_who_has_a_detector_of_their_own_gets_on_with_it(way: Any, room: Path, tmp_path: Path) -> None:
+    way(tmp_path, room)
+
+
+def test_of_twenty_recordings_the_one_that_is_cut_off_is_named_and_run_again(room: Path, tmp_path: Path) -> None:
+    twenty.walk(tmp_path, room)
 
 
 @pytest.mark.parametrize(

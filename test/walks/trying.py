@@ -26,11 +26,11 @@ def a_simulated_recording(folder: Path, room: Path) -> None:
     someone = Walk(folder)
     tried = someone.type("try", str(room), "--no-open")
     assert tried.output.startswith("assumed:") and "It worked: " in tried.text and "none of the " in tried.text
-    text = _body(folder / f"{room.name}.html")
+    text = body(folder / f"{room.name}.html")
     assert text.startswith(room.name) and "What was assumed" in text and "All pairs" in text
     steps = someone.follow(tried, "--page", "pair.html")
     assert "asked for" in steps.text and "off by" in steps.text
-    assert "one pair" in _body(folder / "pair.html")
+    assert "one pair" in body(folder / "pair.html")
 
 
 def wrong_focal_length(folder: Path, room: Path) -> None:
@@ -74,7 +74,7 @@ def _tries(folder: Path, room: Path, changes: dict[str, Change], anchor: str, wo
     first = tried.output.splitlines()[0]
     assert first.startswith("! ") and words in first, tried.text
     assert anchor in tried.leads_to() and tried.advice()
-    finding = _body(folder / "bag.html").splitlines()
+    finding = body(folder / "bag.html").splitlines()
     assert finding[0] == "bag" and words in finding[1], finding[:5]
 
 
@@ -86,7 +86,7 @@ def _changed(room: Path, changes: dict[str, Change]) -> Iterator[Record]:
             yield Record.of(record.topic, message, record.stamp_ns)
 
 
-def _body(page: Path) -> str:
+def body(page: Path) -> str:
     """The text of a page as it is read, line by line."""
     text = page.read_text(encoding="utf-8").partition("<main>")[2]
     lines = (line.strip() for line in re.sub(r"<[^>]*>", "\n", text).splitlines())
