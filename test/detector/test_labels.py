@@ -130,7 +130,7 @@ def test_a_file_beside_stands_in_for_metadata_that_do_not_fit(names: str, tmp_pa
 
     assert find_labels(tmp_path / "m.onnx", None, {"names": names}, two) == ("cup", "chair")
     (tmp_path / "m.txt").unlink()
-    with pytest.raises(ValueError, match=r"expected (2 labels, got|a dict .*--labels\), or put that file .* as m\.txt)"):
+    with pytest.raises(ValueError, match=r"expected (2 labels, got|a dict .*--labels\), or put that file .*m\.txt)"):
         find_labels(tmp_path / "m.onnx", None, {"names": names}, two)
 
 
