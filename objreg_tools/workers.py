@@ -125,7 +125,7 @@ def _done(item: Item, future: Any) -> Done[Item, Any]:
 
 
 def _alone(work: Callable[[Item], Value], topic: str, number: int, item: Item) -> Done[Item, Value]:
-    """The work in one thread; its exception comes back as it is, since Dask would log it with its stack."""
+    """The work in one thread; its exception comes back alone: raised, Dask would log it with its stack."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -133,6 +133,7 @@ def _alone(work: Callable[[Item], Value], topic: str, number: int, item: Item) -
     try:
         return Done(item, work(item))
     except Exception as error:  # a bug at one item is no reason to lose the others
+        error.__cause__ = error.__context__ = None  # those of libraries may be none that can be sent
         return Done(item, error=error)
     finally:
         _reports.reset(before)

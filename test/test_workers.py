@@ -32,6 +32,13 @@ def die(folder: Path, deaths: int, item: int) -> int:
     return item
 
 
+def stumble(item: int) -> int:
+    """Raises an error whose cause is one that cannot be sent to another process."""
+    behind = KeyError(lambda: item)
+    behind.__cause__ = behind
+    raise ValueError(f"expected another item, got {item}") from behind
+
+
 def count_to(number: int) -> int:
     """The number, with a report at each step."""
     for done in range(1, number + 1):
@@ -48,6 +55,11 @@ def test_two_workers_tell_of_every_item_and_an_error_stops_no_other() -> None:
     assert {item: done.value for item, done in told.items()} == {2: 1, 3: None, 4: 2, 6: 3}
     with pytest.raises(ValueError, match="expected an even number, got 3"):
         told[3].result()
+
+
+def test_an_error_comes_back_whatever_is_behind_it() -> None:
+    (done,) = spread(stumble, [1], workers=1)
+    assert isinstance(done.error, ValueError) and str(done.error) == "expected another item, got 1"
 
 
 def test_a_worker_that_is_killed_costs_its_item_alone_and_one_that_kills_all_is_given_up(tmp_path: Path) -> None:

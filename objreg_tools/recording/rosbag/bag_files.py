@@ -79,7 +79,9 @@ def _without_metadata(folder: Path, files: Sequence[Path], error: ValueError) ->
     try:
         bag = _open_files(files)
     except ValueError as of_files:
-        raise (of_files if len(files) > 1 or isinstance(of_files.__cause__, UnpackingError) else error) from error
+        if len(files) > 1 or isinstance(of_files.__cause__, UnpackingError):
+            raise of_files from error
+        raise error from error.__cause__  # not from itself: a chain without end cannot be sent to another process
     if bag.files == list(files):
         cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
         bag.notes.insert(0, f"{METADATA} is not used ({_why(folder, cause)}): {_listed(bag.files)} read without it")

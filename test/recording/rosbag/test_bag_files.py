@@ -199,3 +199,12 @@ def test_a_folder_of_pictures_says_that_a_bag_beside_them_is_not_read(tmp_path: 
     recording = open_recording(folder)
     assert recording.kind == "TUM RGB-D folder"
     assert "also there, and not read: bag.mcap; name one to read it" in recording.notes
+
+
+def test_the_error_of_a_folder_whose_only_file_is_empty_is_not_its_own_cause(tmp_path: Path) -> None:
+    folder = tmp_path / "bag"
+    write_rosbag2(folder, records(1))
+    next(folder.glob("*.mcap")).write_bytes(b"")
+    with pytest.raises(ValueError, match="seems to be empty") as refused:
+        open_recording(folder)
+    assert refused.value.__cause__ is not refused.value
