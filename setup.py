@@ -145,6 +145,7 @@ setup(
             "detector = objreg_ros.detector.node:main",
             "segmenter = objreg_ros.segmenter.node:main",
             "registrar = objreg_ros.registrar.node:main",
+            "blackbox = objreg_ros.blackbox.node:main",
             "keyframer = objreg_ros.keyframes.node:main",
             "mapper = objreg_mapper.node:main",
             "objreg_to_rtabmap = objreg_mapper.adapters.rtabmap:main",

@@ -73,6 +73,8 @@ OPTIONS = {
     "exchange": "namespace of the topics by which registrars of several robots exchange keyframes, as /fleet",
     "key_file": "file with the key that the robots share, by which keyframes of registrar and keyframer are signed",
     "mapper": "true to start the reference mapper too, which publishes path and correction",
+    "blackbox": "seconds of all inputs that a black box keeps, as 10, and writes where something goes wrong; a process "
+    "of its own",
     "composed": "false for a process for each node, with 1.7 times the memory; so it is with managed or enclaves",
     "managed": "true for nodes with a life cycle (~/change_state), each a process",
     "autostart": "false to leave managed nodes unconfigured until somebody asks for more",
@@ -123,6 +125,8 @@ def _nodes(context: LaunchContext) -> list[Node]:
         "on_exit": None if _is_true(said["respawn"]) else _ended,
     }
     nodes = [_together(names, said, alike)] if _is_composed(said) else [_alone(node, said, alike) for node in names]
+    if said["blackbox"]:
+        nodes.append(_alone("blackbox", said, alike))
     return [*nodes, *_rviz(said, alike)]
 
 
@@ -224,9 +228,19 @@ def _parameters(node: str, said: dict[str, str]) -> list:
     """The user's file, and over it what was said on the command line."""
     values: dict = {name: _is_true(said[name]) for name in SWITCHES if said[name]}
     values |= {name: said[name] for name in OWN.get(node, ()) if said[name]}
-    if said["T_base_camera"] and node != "detector":
+    if node == "blackbox":
+        values["blackbox_seconds"] = _seconds("blackbox", said["blackbox"])
+    if said["T_base_camera"] and node not in ("detector", "blackbox"):
         values["T_base_camera"] = _numbers("T_base_camera", said["T_base_camera"])
     return [given for given in (said["params_file"], values) if given]
+
+
+def _seconds(argument: str, text: str) -> float:
+    """The number of an argument; ValueError that names it for anything else."""
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{argument}: expected a number of seconds, got {text!r}") from None
 
 
 def _numbers(argument: str, text: str) -> list[float]:

@@ -14,7 +14,7 @@ from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PACKAGES = ("objreg_ros", "objreg_mapper", "objreg_tools")
-STAGES = ("detector", "segmenter", "registrar")
+STAGES = ("detector", "segmenter", "registrar", "blackbox")
 # The registrar's own folders: each may import those before it, in the order in which a pair of keyframes goes.
 FLOORS = (
     *("registration.params", "registration.labels", "registration.keyframe", "registration.candidate"),

@@ -20,6 +20,7 @@ from objreg_mapper.adapters.params import (
     ToRtabmapParams,
 )
 from objreg_mapper.params import MapperNodeParams, MapperParams
+from objreg_ros.blackbox.params import BlackboxParams
 from objreg_ros.bridge.node.params import ManagedParams, NodeBaseParams
 from objreg_ros.bridge.streams.params import ExchangeParams, KeyParams, PeerParams, RelocalisedParams
 from objreg_ros.detector.params import DetectorParams
@@ -45,6 +46,7 @@ NODES: dict[str, tuple[type[Params], ...]] = {
         NodeBaseParams,
     ),
     "keyframer": (KeyframeParams, KeyframerNodeParams, KeyParams, ManagedParams, NodeBaseParams),
+    "blackbox": (BlackboxParams, ManagedParams, NodeBaseParams),
     "mapper": (MapperParams, MapperNodeParams, ManagedParams, NodeBaseParams),
     "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, NodeBaseParams),
     "objreg_to_lio_sam": (ToLioSamParams, AdapterParams, NodeBaseParams),
