@@ -18,7 +18,7 @@ HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, INDEX, CHUNK_INDEX = range(1, 9
 STATISTICS, DATA_END = 0x0B, 0x0F
 CHUNK_BYTES = 4_000_000
 LIBRARY = "objreg_ros"
-FOREVER = "{sec: 9223372036, nsec: 854775807}"
+FOREVER = "{{sec: 9223372036, nsec: 854775807}}"  # with its braces doubled, for `str.format`
 LATCHED = (
     "- {{history: keep_last, depth: {depth}, reliability: reliable, durability: transient_local, "
     f"deadline: {FOREVER}, lifespan: {FOREVER}, liveliness: automatic, liveliness_lease_duration: {FOREVER}, "
