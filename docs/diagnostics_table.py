@@ -11,6 +11,7 @@ from pathlib import Path
 
 from objreg_mapper.adapters.diagnostics import AdapterDiagnostics, G2oDiagnostics, RtabmapDiagnostics
 from objreg_mapper.diagnostics import MapperDiagnostics
+from objreg_ros.blackbox.diagnostics import BlackboxDiagnostics
 from objreg_ros.bridge.node.common import CommonDiagnostics, StreamDiagnostics
 from objreg_ros.diagnostics import Declaration, Diagnostics
 from objreg_ros.keyframes.diagnostics import KeyframerDiagnostics
@@ -26,6 +27,7 @@ OWN: dict[str, tuple[type[Diagnostics], ...]] = {
     "segmenter": (StreamDiagnostics, SegmenterDiagnostics),
     "registrar": (StreamDiagnostics, RegistrarDiagnostics),
     "keyframer": (StreamDiagnostics, KeyframerDiagnostics),
+    "blackbox": (BlackboxDiagnostics,),
     "mapper": (MapperDiagnostics,),
     "objreg_to_rtabmap": (AdapterDiagnostics, RtabmapDiagnostics),
     "objreg_to_lio_sam": (AdapterDiagnostics,),

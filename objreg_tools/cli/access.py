@@ -71,6 +71,16 @@ NODES: dict[str, Access] = {
         serves=("~/relocalise", "~/reset", "~/save", "~/enable"),
     ),
     "keyframer": MANAGED + Access(writes=("keyframes",), reads=FRAMES),
+    "blackbox": MANAGED
+    + Access(
+        reads=(
+            *(*IMAGES, "points", "depth/image", "depth/image/compressedDepth", "camera_info", "colour/camera_info"),
+            *(*ODOMETRY, "imu", *TF, "detections_table", "detections_in", "masks", "label_info", "labels"),
+            *("refusals", "acceptances", "constraints", "landmarks", "finished", "localisation_state"),
+        ),
+        serves=("~/write",),
+        calls=tuple(f"{n}/{call}" for n in STAGES[:3] for call in ("list_parameters", "get_parameters")),
+    ),
     "mapper": MANAGED
     + Access(
         writes=("path", "correction", "graph", "pruned", "tf"),

@@ -17,6 +17,7 @@ CLASSES = {
     "segmenter": "objreg_ros.segmenter.node.SegmenterNode",
     "registrar": "objreg_ros.registrar.node.RegistrarNode",
     "keyframer": "objreg_ros.keyframes.node.KeyframerNode",
+    "blackbox": "objreg_ros.blackbox.node.BlackboxNode",
     "mapper": "objreg_mapper.node.MapperNode",
     "objreg_to_rtabmap": "objreg_mapper.adapters.rtabmap.ToRtabmap",
     "objreg_to_lio_sam": "objreg_mapper.adapters.lio_sam.ToLioSam",

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The black box beside live nodes: what it writes has the inputs as they came, and gives the same verdict offline.
 
-The same verdict: for every pair of keyframes that both lie wholly inside the file, the live graph and `objreg offline`
-say the same word, a constraint or the reason of a refusal; neither has a pair there that the other has not.
+The same verdict: both cut the same keyframes, and for every pair of them that both registered they say the same word, a
+constraint or the reason of a refusal. Which pairs are registered hangs on all that is stored: a file that holds all since
+the registrar began gives every pair of the live graph and no other.
 """
 
 from __future__ import annotations
@@ -29,12 +30,12 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 INPUTS = ("/image", "/depth/image", "/camera_info", "/odom")
 ACCEPTED = "accepted"
 NODES = ("detector", "segmenter", "registrar")
-SETTLED_NS = 1_500_000_000  # a pair of the last keyframe may still wait for others as the file is written
+OF_THE_STORE = {"no_candidate", "redundant"}  # refusals that nothing but the other stored keyframes decides
 
 
 @pytest.fixture(scope="module")
 def room(graph: Graph, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ten seconds of a simulated room that the camera leaves and comes back to."""
+    """A simulated room that the camera leaves and comes back to."""
     folder = tmp_path_factory.mktemp("room") / "bag"
     words = ("--scenario", "loop", "--seed", "1", "--frames", "100", "--rate", "10", "--intrinsics", "qvga")
     objreg(graph, "simulate", str(folder), *words)
@@ -43,11 +44,11 @@ def room(graph: Graph, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def played(graph: Graph, room: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The folder of two black boxes, of 60 s and of 4 s, behind a lossless replay of the room."""
+    """The folder of two black boxes, of 60 s and of 45 s, behind a lossless replay of the room."""
     folder = tmp_path_factory.mktemp("boxes")
     for node in NODES:
         graph.start(node, node, "-p reliable:=true")
-    for name, seconds in (("whole", 60.0), ("part", 4.0)):
+    for name, seconds in (("whole", 60.0), ("part", 45.0)):
         where = f"-p blackbox_folder:={folder / name}"
         graph.start(
             name, "blackbox", "-p reliable:=true", f"-p blackbox_seconds:={seconds}", where, f"-r __node:={name}"
@@ -93,23 +94,29 @@ def test_a_run_on_the_file_gives_the_verdicts_of_the_live_graph(
 ) -> None:
     done, path = call(graph, Trigger, f"{box}/write")
     assert done, path
-    file = Path(path)
+    file, out = Path(path), tmp_path / "offline.json"
     said = about(file)
     assert (said["event"], said["topics"]["image"]) == ("called", "/image")
-    assert {f"/**/{node}" for node in NODES} == said["parameters"].keys()
-    objreg(graph, "offline", str(file), "--params", str(file.with_suffix(".yaml")), "--json", str(tmp_path / "o.json"))
-    offline = offline_verdicts(json.loads((tmp_path / "o.json").read_text()))
-    live = live_verdicts(graph)
-    keyframes = {headers.stamp_ns(message) for message in graph.received["landmarks"]}
-    if box == "part":
-        assert said["begin_ns"] in keyframes
+    assert said["parameters"].keys() == {f"/**/{node}" for node in NODES}
+    objreg(graph, "offline", str(file), "--params", str(file.with_suffix(".yaml")), "--json", str(out))
+    offline = offline_verdicts(json.loads(out.read_text()))
     span = said["begin_ns"], said["end_ns"]
-    expected = inside(live, *span)
-    print(box, len(live), len(expected), len(offline), sorted(k for k in keyframes if k >= span[0])[:3], span)
-    differ = {p: (expected.get(p), offline.get(p)) for p in expected.keys() | offline.keys() if expected.get(p) != offline.get(p)}
-    print(len(differ), differ)
-    assert ACCEPTED in expected.values() and len(set(expected.values())) > 1
-    assert offline == expected
+    live = inside(live_verdicts(graph), *span)
+    keyframes = {headers.stamp_ns(message) for message in graph.received["landmarks"]}
+    assert said["begin_ns"] in keyframes
+    assert {to_ns for _, to_ns in offline} == {stamp for stamp in keyframes if span[0] <= stamp <= span[1]}
+    print(
+        box,
+        len(live),
+        len(offline),
+        {p: (live[p], offline[p]) for p in live.keys() & offline.keys() if live[p] != offline[p]},
+    )
+    both = {p for p in live.keys() & offline.keys() if not {live[p], offline[p]} & OF_THE_STORE}
+    print(len(both), [live[p] for p in both])
+    assert {pair: live[pair] for pair in both} == {pair: offline[pair] for pair in both}
+    assert ACCEPTED in {live[pair] for pair in both}
+    if box == "whole":
+        assert offline == live and len(set(live.values())) > 3
 
 
 def test_the_inputs_are_in_the_file_byte_for_byte(graph: Graph, played: Path, room: Path) -> None:

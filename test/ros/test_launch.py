@@ -67,6 +67,14 @@ def test_the_mapper_comes_along_when_it_is_asked_for(repository: Path, said: dic
     assert names({**said, "mapper": "True"}) == ("detector", "segmenter", "registrar", "mapper")
 
 
+def test_a_black_box_gets_its_seconds_and_nothing_of_the_camera(repository: Path, said: dict[str, Any]) -> None:
+    parameters = launch_file(repository)["_parameters"]
+    given = {**said, "blackbox": "10", "T_base_camera": "0,0,1,0,0,0,1", "reliable": "true"}
+    assert parameters("blackbox", given) == [{"reliable": True, "blackbox_seconds": 10.0}]
+    with pytest.raises(ValueError, match="blackbox: expected a number of seconds, got 'ten'"):
+        parameters("blackbox", {**given, "blackbox": "ten"})
+
+
 @pytest.mark.parametrize(("detections", "first"), [("table", "detector"), ("masks", "segmenter")])
 def test_our_detector_stays_at_home_where_another_one_speaks(
     detections: str, first: str, repository: Path, said: dict[str, Any]
