@@ -4,7 +4,7 @@
 The same verdict: both cut the same keyframes, and say the same word for the same pairs, a constraint or the reason of a
 refusal. A file that holds all since the registrar began gives that for every pair. One that begins later cuts keyframes
 where the live graph did, but what was learned before is missing (noise of depth, its rotation against colour, other
-stored keyframes): a keyframe or a pair near a limit can turn.
+stored keyframes): a keyframe or a pair can turn.
 """
 
 from __future__ import annotations
