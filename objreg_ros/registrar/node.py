@@ -84,6 +84,7 @@ class RegistrarNode(FramesNode):
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._announcing = threading.Lock(), threading.Lock()
         self._unsearched, self._scene = 0, MarkerScene()
+        self._shown_ns = 0  # of the newest keyframe
         self._may_reset = self.settings.of(PeerParams).allow_remote_reset
         self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
         self._counts = dict[str, Any](self._registrar.counts())
@@ -207,9 +208,17 @@ class RegistrarNode(FramesNode):
             if outcome.keyframe_ns is not None:
                 seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
                 self._announcements.landmarks(*seen, self.names_of(outcome.robot), outcome.session, outcome.robot)
-                self._scene.show_keyframe(outcome.keyframe_ns, outcome.closures, outcome.rejected)
-                objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
-                self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self.odom_frame))
+                self._scene.show_keyframe(outcome.keyframe_ns)
+                self._shown_ns = outcome.keyframe_ns
+            self._show(outcome)
+
+    def _show(self, outcome: Outcome) -> None:
+        """Publish the markers again where something of them changed."""
+        joined = self._scene.join(outcome.closures, outcome.rejected)
+        parted = self._scene.part(outcome.withdrawn)
+        if outcome.keyframe_ns is not None or joined or parted:
+            objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
+            self._announcements.markers(self._scene.markers(objects, self._shown_ns, self.odom_frame))
 
     def _count(self) -> None:
         """Count what is stored, and say so where the oldest had to go."""

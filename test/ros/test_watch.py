@@ -62,4 +62,5 @@ def test_a_graph_that_runs_is_on_the_page_until_ctrl_c(fresh: Graph, tmp_path: P
     assert asked(f"{address}picture.jpg")[:2] == b"\xff\xd8" and b"objreg watch" in asked(address)
     fresh.processes["player"].wait(START_S)
     fresh.processes.pop("player")
+    assert wait_for(lambda: state()["edges"].get("accepted"), ANSWER_S)
     assert fresh.stop("watch", signal.SIGINT) == 130 and "Traceback" not in fresh.log("watch")

@@ -40,13 +40,27 @@ class MarkerScene:
         if frame.T_odom_camera is not None:
             self._recent.append((frame.stamp_ns, frame.T_odom_camera[:3, 3]))
 
-    def show_keyframe(self, keyframe_ns: int, closures: Iterable[LoopClosure], rejected: Iterable[Rejected]) -> None:
-        """A frame became a keyframe, with these edges."""
+    def show_keyframe(self, keyframe_ns: int) -> None:
+        """A frame became a keyframe."""
         self._places.update(item for item in tuple(self._recent) if item[0] == keyframe_ns)
         while len(self._places) > MOST_PLACES:
             del self._places[next(iter(self._places))]
-        self._accepted += [(closure.from_ns, closure.to_ns) for closure in closures]
-        self._rejected += [(refusal.from_ns, refusal.to_ns) for refusal in rejected if refusal.from_ns != refusal.to_ns]
+
+    def join(self, closures: Iterable[LoopClosure], rejected: Iterable[Rejected]) -> bool:
+        """Add edges between keyframes, which may come long after these; whether there are any."""
+        accepted = [(closure.from_ns, closure.to_ns) for closure in closures]
+        refused = [(refusal.from_ns, refusal.to_ns) for refusal in rejected if refusal.from_ns != refusal.to_ns]
+        self._accepted += accepted
+        self._rejected += refused
+        return bool(accepted or refused)
+
+    def part(self, withdrawn: Iterable[LoopClosure]) -> bool:
+        """Take the edges of withdrawn closures away; whether there were any."""
+        gone = {(closure.from_ns, closure.to_ns) for closure in withdrawn}
+        kept = [edge for edge in self._accepted if edge not in gone]
+        changed = len(kept) < len(self._accepted)
+        self._accepted = deque(kept, maxlen=self._accepted.maxlen)
+        return changed
 
     def clear(self) -> None:
         """Forget everything."""

@@ -41,16 +41,30 @@ def test_an_edge_runs_from_where_one_keyframe_was_to_where_the_other_was() -> No
     scene = MarkerScene()
     for stamp_ns in range(1, 5):
         scene.see(frame(stamp_ns, x=10.0 * stamp_ns))
-    scene.show_keyframe(1, [], [])
-    scene.show_keyframe(2, [], [Rejected(reason=Reason.TEXTURE, from_ns=1, to_ns=2, detail="")])
-    scene.show_keyframe(4, [closure(1, 4)], [])
+    scene.show_keyframe(1)
+    scene.show_keyframe(2)
+    scene.join([], [Rejected(reason=Reason.TEXTURE, from_ns=1, to_ns=2, detail="")])
+    scene.show_keyframe(4)
+    scene.join([closure(1, 4)], [])
     assert ends(scene, "accepted") == [10.0, 40.0] and ends(scene, "rejected") == [10.0, 20.0]
 
 
 def test_an_edge_to_a_keyframe_of_unknown_place_is_not_drawn() -> None:
     scene = MarkerScene()
     scene.see(frame(2, x=1.0))
-    scene.show_keyframe(2, [closure(1, 2)], [])
+    scene.show_keyframe(2)
+    scene.join([closure(1, 2)], [])
+    assert ends(scene, "accepted") == []
+
+
+def test_an_edge_that_comes_after_its_keyframes_is_drawn_and_goes_when_it_is_withdrawn() -> None:
+    scene = MarkerScene()
+    for stamp_ns in (1, 2):
+        scene.see(frame(stamp_ns, x=10.0 * stamp_ns))
+        scene.show_keyframe(stamp_ns)
+    assert not scene.join([], []) and scene.join([closure(1, 2)], [])
+    assert ends(scene, "accepted") == [10.0, 20.0]
+    assert not scene.part([closure(1, 3)]) and scene.part([closure(1, 2)])
     assert ends(scene, "accepted") == []
 
 
@@ -59,7 +73,8 @@ def test_a_long_run_shows_the_newest_edges(monkeypatch: pytest.MonkeyPatch) -> N
     scene = MarkerScene()
     for stamp_ns in range(1, 5):
         scene.see(frame(stamp_ns, x=10.0 * stamp_ns))
-        scene.show_keyframe(stamp_ns, [closure(1, stamp_ns)] if stamp_ns > 1 else [], [])
+        scene.show_keyframe(stamp_ns)
+        scene.join([closure(1, stamp_ns)] if stamp_ns > 1 else [], [])
     assert ends(scene, "accepted") == [10.0, 30.0, 10.0, 40.0]
 
 
@@ -80,7 +95,8 @@ def test_nothing_is_left_of_a_cleared_scene() -> None:
     scene = MarkerScene()
     for stamp_ns in (1, 2):
         scene.see(frame(stamp_ns, x=1.0))
-        scene.show_keyframe(stamp_ns, [closure(1, 2)], [])
+        scene.show_keyframe(stamp_ns)
+        scene.join([closure(1, 2)], [])
     scene.clear()
     assert ends(scene, "accepted") == []
 
@@ -90,5 +106,6 @@ def test_the_places_of_keyframes_are_bounded(monkeypatch: pytest.MonkeyPatch) ->
     scene = MarkerScene()
     for stamp_ns in range(1, 7):
         scene.see(frame(stamp_ns, float(stamp_ns)))
-        scene.show_keyframe(stamp_ns, [closure(stamp_ns - 1, stamp_ns)], [])
+        scene.show_keyframe(stamp_ns)
+        scene.join([closure(stamp_ns - 1, stamp_ns)], [])
     assert ends(scene, "accepted") == [4.0, 5.0, 5.0, 6.0]
