@@ -115,11 +115,11 @@ def _of_recording(opened: Opened) -> list[Finding]:
     return [*troubles(opened.source, opened.inputs), *([model] if model else [])]
 
 
-def _ordered(summary: Mapping[str, Any], known: Iterable[Finding]) -> list[Finding]:
+def _ordered(summary: Mapping[str, Any], known: Sequence[Finding]) -> list[Finding]:
     """All findings on a run, those on its recording first; of one section of the troubleshooting page the first."""
     of_stream = [Finding(**row) for row in summary["stream"]]
     found: dict[str, Finding] = {}
-    for finding in (*of_stream, *known, *find(summary)):
+    for finding in (*of_stream, *known, *find(summary, known)):
         found.setdefault(finding.anchor or finding.what, finding)
     return list(found.values())
 

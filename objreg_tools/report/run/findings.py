@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from objreg_ros import share
@@ -25,7 +25,7 @@ from objreg_tools.report.words import change, judgement, number_of
 MANY = 0.05  # of the frames of a node; fewer that are overtaken are usual
 SELDOM = 0.2  # of the frames; a model that knows what it sees finds more
 LATE_MS, LATE_SIGMAS = 45.0, 4.0  # cameras whose two pictures are taken in turn are up to a picture apart
-OVERTAKEN = "overtaken"
+OVERTAKEN, ALL_REFUSED = "overtaken", "all-refused"
 SOURCES = {"odometry": "odometry", "tracked": "our own tracking"}  # of a trajectory, in words
 PASSED_OVER = tuple(reason.value for reason in (Reason.OVER_BUDGET, Reason.CLOCK, Reason.UNREADABLE))
 LOOK = "objreg inspect {recording}"
@@ -87,11 +87,14 @@ def find(summary: Mapping[str, Any], of_recording: Iterable[Finding] = ()) -> tu
     A stream that was measured to differ from what it states comes first among the causes.
     """
     counts, causes = Counts.of(summary), tuple(Finding(**row) for row in summary.get("stream", ()))
+    of_recording = tuple(of_recording)
     steps = (_no_frame, _no_detections, _no_objects)
     later = () if causes else (_none_tried, _no_revisit, _all_refused)
-    stopped = () if counts.constraints else (_first((*steps, *later), counts, summary),)
+    stopped = None if counts.constraints else _first((*steps, *later), counts, summary)
+    if stopped is not None and stopped.anchor == ALL_REFUSED and of_recording:
+        stopped = replace(stopped, cause=f"what is wrong with the recording, below; else {stopped.cause}")
     found = (
-        *stopped,
+        stopped,
         *causes,
         _late_depth(summary),
         *of_recording,
@@ -213,7 +216,7 @@ def _all_refused(counts: Counts, summary: Mapping[str, Any]) -> Finding | None:
         f"all {sum(counts.tried.values())} candidates were refused: {counted(counts.tried)}",
         "what came back was seen from too different a side, or too little of it, to be sure",
         "look at the refused pairs in the report (`objreg report RUN.json`), and come back nearer to the first view",
-        "all-refused",
+        ALL_REFUSED,
     )
 
 

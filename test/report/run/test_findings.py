@@ -32,6 +32,13 @@ def test_the_first_step_that_gave_nothing_is_named() -> None:
     assert find(CLOSED) == ()
 
 
+def test_what_is_wrong_with_the_recording_explains_refusals_first() -> None:
+    rejected = {**EMPTY, "rejected": {"low_overlap": 2}}
+    (refused,) = find(rejected)
+    (after, units) = find(rejected, [Finding("depth begins at 3.6 m", "other steps", "", "units")])
+    assert after.cause == f"what is wrong with the recording, below; else {refused.cause}" and units.anchor == "units"
+
+
 @pytest.mark.parametrize(
     ("reason", "anchor"),
     [("over_budget", "over-budget"), ("clock_began_anew", "clock_began_anew"), ("unreadable", "unreadable")],
