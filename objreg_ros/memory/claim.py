@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 MAGIC = b"SQLite format 3\0"
@@ -97,6 +97,28 @@ class Claim:
         old, self._descriptor = self._descriptor, descriptor
         if old >= 0:
             _let_go(old)
+
+
+@contextmanager
+def unwritten_by_others(path: Path) -> Iterator[None]:
+    """Keeps registrars from the file at ``path`` within the block, which only reads it. StoreError if one has it.
+
+    Every connection to the file must end before the block does, as with `Claim.release`.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError as error:
+        raise StoreError(f"{path}: expected a store that can be read, got: {error.strerror}") from error
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError:
+        raise StoreError(
+            f"{path}: in use by a registrar: expected a store that nobody writes, got one of process "
+            f"{_holder(_inode(os.fstat(descriptor)))}; end that"
+        ) from None
+    finally:
+        os.close(descriptor)
 
 
 def read_header(path: Path) -> bytes:

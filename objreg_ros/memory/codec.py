@@ -172,7 +172,7 @@ def keyframe_from_rows(
         view=View(xyz=xyz, grey=grey, intrinsics=camera),
         gravity=_gravity(row),
         gravity_confidence=row["gravity_confidence"],
-        T_odom_camera=_pose(row),
+        T_odom_camera=pose_from_row(row),
         by_odometry=bool(row["by_odometry"]),
         travelled=row["travelled"],
         turned=row["turned"],
@@ -288,9 +288,10 @@ def pose_of(numbers: Array) -> Array:
     return T
 
 
+def pose_from_row(row: Mapping[str, Any]) -> Array | None:
+    """``T_odom_camera (4, 4)`` from the row of a keyframe; None where it has none. ValueError if it is damaged."""
+    return None if row["T_odom_camera"] is None else pose_of(np.frombuffer(_bytes_of(row, "T_odom_camera", 128)))
+
+
 def _gravity(row: Mapping[str, Any]) -> Array | None:
     return None if row["gravity"] is None else gravity_of(np.frombuffer(_bytes_of(row, "gravity", 24)))
-
-
-def _pose(row: Mapping[str, Any]) -> Array | None:
-    return None if row["T_odom_camera"] is None else pose_of(np.frombuffer(_bytes_of(row, "T_odom_camera", 128)))

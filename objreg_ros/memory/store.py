@@ -19,10 +19,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.keyframes.recent import RecentKeyframes
 from objreg_ros.memory.claim import Claim, StoreError
-from objreg_ros.memory.codec import closure_from_row, keyframe_from_rows, require_keyframe, sighting_from_row
+from objreg_ros.memory.codec import (
+    closure_from_row,
+    keyframe_from_rows,
+    pose_from_row,
+    require_keyframe,
+    sighting_from_row,
+)
 from objreg_ros.memory.counters import Counters, read_counters
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import opened
@@ -59,6 +66,7 @@ ROWS = (  # of one keyframe
     "SELECT * FROM object WHERE keyframe = ? ORDER BY id",
     "SELECT cloud.* FROM cloud JOIN object USING (id) WHERE keyframe = ? ORDER BY id",
 )
+FINGERPRINTS = "SELECT stamp_ns, travelled, turned, T_odom_camera, gravity, gravity_confidence FROM keyframe"
 HEAD = ("id", "session", "stamp_ns", "robot", "origin", "travelled", "by_odometry")  # what is kept of each keyframe
 
 
@@ -113,9 +121,14 @@ class Store:
 
     def add_closure(self, closure: LoopClosure, merged: Mapping[int, Merge]) -> None:
         """Write a closure of keyframes that are stored already; ``merged`` and StoreError as in `write_keyframe`."""
+        self.add_closures(((closure, merged),))
+
+    def add_closures(self, closures: Iterable[tuple[LoopClosure, Mapping[int, Merge]]]) -> None:
+        """`add_closure` of several, all in one transaction: all of them are written, or none."""
         with self._reporting("write a closure"), self._changing() as (transaction, counters):
-            write_closures(transaction, counters, (closure,), MOST_CLOSURES)
-            rename_landmarks(transaction, merged)
+            for closure, merged in closures:
+                write_closures(transaction, counters, (closure,), MOST_CLOSURES)
+                rename_landmarks(transaction, merged)
 
     def veto(self, vetoes: Sequence[Veto]) -> None:
         """Withdraw closures, all or none: each is a veto from now on, and no closure of this store any more.
@@ -194,6 +207,21 @@ class Store:
             return None if number is None else Stand.of(self.keyframe(number))
         except StoreError:
             return None
+
+    def heads(self) -> Iterator[Mapping[str, Any]]:
+        """What is known of each keyframe without reading it, by the names of `HEAD`, the oldest first."""
+        yield from self._heads.values()
+
+    def poses(self) -> Iterator[tuple[int, Array | None]]:
+        """The id and ``T_odom_camera (4, 4)`` of every keyframe, the oldest first; None where it has none."""
+        with self._reporting("read the poses"):
+            for row in self._connection.execute("SELECT id, T_odom_camera FROM keyframe ORDER BY id"):
+                yield row["id"], pose_from_row(row)
+
+    def fingerprints(self) -> set[tuple[Any, ...]]:
+        """What every keyframe measured when and where, in full precision: two that are equal are one keyframe."""
+        with self._reporting("read the keyframes"):
+            return set(map(tuple, self._connection.execute(FINGERPRINTS)))
 
     def beyond(self, most: int, most_bytes: float = math.inf) -> list[int]:
         """The ids of the oldest keyframes, those that are more than ``most`` or make the store larger than that.
@@ -281,6 +309,11 @@ class Store:
         """An id that no landmark ever had here, whatever was forgotten since; StoreError where they are used up."""
         with self._reporting("number a landmark"):
             return self._counters.next("landmark")
+
+    def next_closure(self) -> int:
+        """A number that no closure ever had here; StoreError where they are used up."""
+        with self._reporting("number a closure"):
+            return self._counters.next("closure")
 
     def next_session(self) -> int:
         """The number of a session that nothing is stored of yet, nor is a closure to it, as to a keyframe elsewhere."""
