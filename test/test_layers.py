@@ -35,7 +35,7 @@ FREE_BRIDGE = (
 )
 FOR_ALL = ("limits", "sensor", "whole_file", "terminal", "share", "extra", "diagnostics", "native")
 CORE = (*FOR_ALL, "data", "lens", "geometry", "params")
-DRIVERS = tuple(f"objreg_tools.{name}" for name in ("offline", "rehearsal", "truth", "workers", "report"))
+DRIVERS = tuple(f"objreg_tools.{name}" for name in ("offline", "rehearsal", "truth", "workers", "report", "merge"))
 
 
 def module_name(path: Path) -> str:

@@ -42,6 +42,7 @@ SUMMARIES = {
     "convert": "Write any recording as rosbag2.",
     "veto": "Withdraw closures of a store that are wrong, or undo that.",
     "accept": "Write a closure of two keyframes of a store that a person knows to be right.",
+    "merge": "Merge stores of several robots or days into one, tied together.",
     "export": "Write the objects of a store as PLY and JSON.",
     "simulate": "Make a recording with exact ground truth.",
     "fetch-model": "Get a detector model.",
