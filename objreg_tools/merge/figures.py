@@ -150,8 +150,10 @@ def _contradiction_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 def _maps(rows: Sequence[Mapping[str, Any]]) -> str:
     texts = []
     for row in rows:
-        error = "" if row["error_cm"] is None else f", {row['error_cm']:.1f} cm from the truth"
-        texts.append(f"sessions {', '.join(map(str, row['sessions']))} in one frame by {row['kept']} closures{error}")
+        numbers, error = row["sessions"], row["error_cm"]
+        which = f"sessions {', '.join(map(str, numbers))} in one frame" if len(numbers) > 1 else f"session {numbers[0]}"
+        truth = "" if error is None else f", {error:.1f} cm from the truth"
+        texts.append(f"{which} by {row['kept']} closures{truth}")
     return "; ".join(texts) or "no map"
 
 

@@ -11,14 +11,17 @@ from tqdm import tqdm
 
 from objreg_mapper.params import MapperParams
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.whole_file import write_whole
 from objreg_tools.cli import options
 from objreg_tools.cli.paths import InputPath, InputText, OutputPath
 from objreg_tools.cli.run_output import json_to, print_next
 from objreg_tools.cli.settings import print_ignored, read_settings
 from objreg_tools.merge.figures import described, evaluate, figures
+from objreg_tools.merge.merge_page import merge_page
 from objreg_tools.merge.merging import Merged, merge
 from objreg_tools.recording import open_recording
 from objreg_tools.recording.inputs import choose_inputs
+from objreg_tools.report.store.store_summary import survey
 from objreg_tools.truth import Truth, Truths
 
 
@@ -36,6 +39,12 @@ from objreg_tools.truth import Truth, Truths
     help="A recording with the true path of a robot, by its name in the merged store; of all robots without a name. "
     "All paths are in one world.",
 )
+@click.option(
+    "--page",
+    type=OutputPath(dir_okay=False, path_type=Path),
+    metavar="FILE.html",
+    help="Before and after as a page, with the ties, what contradicts and what moved.",
+)
 @options.change
 @options.params
 @options.json_out
@@ -43,6 +52,7 @@ def command(
     stores: tuple[Path, ...],
     out: Path,
     truths: tuple[str, ...],
+    page: Path | None,
     changes: tuple[str, ...],
     params_file: Path | None,
     json_file: Path | None,
@@ -66,6 +76,9 @@ def command(
         known = _truths(truths, [name for store in merged.stores for name in store["robots"].values()])
         write_json(figures(found, known))
         click.echo(described(found, known))
+        if page is not None:
+            write_whole(page, merge_page(found, survey(out), known))
+            click.echo(f"  written into {page}")
     print_next("objreg", "inspect", str(out), "--page", f"{out.stem}.html")
 
 

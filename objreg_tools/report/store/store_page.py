@@ -27,7 +27,7 @@ SIDES = {"wide": (300, 480), "narrow": (240, 380)}  # px, the least and the grea
 
 def store_page(found: StoreSummary, pictures: Mapping[int, Array]) -> str:
     """The HTML of a store; ``pictures`` are the portraits by landmark, and a landmark may lack one."""
-    styles = {label: f"series-{min(k, SERIES)}" for k, label in enumerate(found.labels)}
+    styles = label_styles(found)
     maps = session_maps(found)
     return environment().get_template("store.html.j2").render(
         found=found,
@@ -35,14 +35,14 @@ def store_page(found: StoreSummary, pictures: Mapping[int, Array]) -> str:
         vetoes=vetoes_as_text(found),
         legend=[(styles[label], f"{label} ({count})") for label, count in found.labels.items()],
         sessions=[
-            {**session, "drawing": {name: _drawn(one, styles, name) for name in WIDTHS}}
+            {**session, "drawing": {name: drawn_alone(one, styles, name) for name in WIDTHS}}
             for session, one in zip(found.sessions, maps, strict=True)
         ],
         tied=[
             {
                 "sessions": _listed(one.sessions),
                 "ties": len(one.ties),
-                "drawing": {name: _drawn_together(one, styles, name) for name in WIDTHS_TIED},
+                "drawing": {name: drawn_together(one, styles, name) for name in WIDTHS_TIED},
             }
             for one in tied_maps(found)
         ],
@@ -50,7 +50,13 @@ def store_page(found: StoreSummary, pictures: Mapping[int, Array]) -> str:
     )  # fmt: skip
 
 
-def _drawn(one: SessionMap, styles: Mapping[str, str], width: str) -> str:
+def label_styles(found: StoreSummary) -> dict[str, str]:
+    """The class of each label, the most frequent first; the last is that of all others."""
+    return {label: f"series-{min(k, SERIES)}" for k, label in enumerate(found.labels)}
+
+
+def drawn_alone(one: SessionMap, styles: Mapping[str, str], width: str) -> str:
+    """One session as SVG; ``styles`` are the classes of the labels, ``width`` a name of `WIDTHS`."""
     least, most = SIDES[width]
     plot = Plot.equal(one.points, WIDTHS[width], least, most)
     plot.x_axis(f"{one.axes[0]} [m]")
@@ -63,7 +69,8 @@ def _drawn(one: SessionMap, styles: Mapping[str, str], width: str) -> str:
     return plot.svg(f"session {one.session} from above")
 
 
-def _drawn_together(one: TiedMap, styles: Mapping[str, str], width: str) -> str:
+def drawn_together(one: TiedMap, styles: Mapping[str, str], width: str) -> str:
+    """Tied sessions as SVG; ``width`` is a name of `WIDTHS_TIED`."""
     least, most = SIDES[width]
     plot = Plot.equal(one.points, WIDTHS_TIED[width], least, 2 * most)
     plot.x_axis(f"{one.axes[0]} [m]")
