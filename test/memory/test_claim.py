@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.memory.claim import Claim, StoreError, read_header
+from objreg_ros.memory.claim import Claim, StoreError, read_header, unwritten_by_others
+from objreg_ros.memory.store import Store
 
 HOLDER = """
 import sys, time
@@ -138,3 +139,22 @@ def test_a_holder_that_is_forgotten_lets_go(tmp_path: Path) -> None:
     held = Claim(tmp_path / "place.db", Path.touch)
     del held
     Claim(tmp_path / "place.db", Path.touch).release()
+
+
+def test_a_file_that_is_only_read_is_kept_from_writers_until_the_end(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    Store(path).close()
+    before = path.read_bytes()
+    with unwritten_by_others(path), unwritten_by_others(path), pytest.raises(StoreError, match="in use"):
+        Store(path)
+    Store(path).close()
+    assert path.read_bytes() == before
+
+
+def test_a_file_that_a_registrar_has_is_not_kept_from_it(tmp_path: Path) -> None:
+    store = Store(tmp_path / "place.db")
+    with pytest.raises(StoreError, match="in use by a registrar"), unwritten_by_others(tmp_path / "place.db"):
+        pass
+    store.close()
+    with pytest.raises(StoreError, match="a store that can be read"), unwritten_by_others(tmp_path / "none.db"):
+        pass

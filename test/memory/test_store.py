@@ -13,6 +13,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -690,3 +691,34 @@ def test_a_temporary_store_keeps_keyframes_on_the_disk_and_reads_back_what_was_p
     assert back is not written and back.labels == written.labels
     assert np.array_equal(back.objects[0].cloud.xyz, written.objects[0].cloud.xyz)
     assert np.allclose(back.view.xyz, written.view.xyz, atol=1e-5)
+
+
+def test_heads_poses_and_fingerprints_are_known_without_reading_a_keyframe(tmp_path: Path) -> None:
+    store = Store(tmp_path / "s.db")
+    one = replace(keyframe(1, 3.5, session=2), robot="robot1", T_odom_camera=moved(0.5), travelled=1.5)
+    store.write_keyframe(one, sightings_of(one))
+    (head,), ((number, T),) = store.heads(), store.poses()
+    assert (head["id"], head["session"], head["robot"], head["travelled"]) == (1, 2, "robot1", 1.5)
+    assert number == 1 and T is not None and (moved(0.5) == T).all()
+    again = Store()
+    again.write_keyframe(replace(one, keyframe_id=9, session=7), sightings_of(replace(one, keyframe_id=9, session=7)))
+    assert store.fingerprints() == again.fingerprints()
+    again.write_keyframe(replace(one, keyframe_id=10, travelled=1.6), sightings_of(replace(one, keyframe_id=10)))
+    assert len(again.fingerprints() - store.fingerprints()) == 1
+    store.close()
+
+
+def test_closures_that_are_written_together_are_all_there_or_none(tmp_path: Path) -> None:
+    store = Store(tmp_path / "s.db")
+    closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",))
+
+    def broken() -> Iterator[tuple[LoopClosure, dict[int, Merge]]]:
+        yield closure, {}
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(StoreError, match="No space left"):
+        store.add_closures(broken())
+    assert store.counts()["closures"] == 0 and store.next_closure() == 1
+    store.add_closures([(closure, {}), (closure, {})])
+    assert store.counts()["closures"] == 2 and store.next_closure() == 3
+    store.close()
