@@ -52,7 +52,7 @@ class Unfinished:
         if os.path.lexists(place):
             raise ValueError(f"{place}: expected a new file, got one that exists; move it, or choose another")
         self.place = place
-        self.store_path = place.with_name(f"{place.name}.unfinished")
+        self.store_path = unfinished_path(place)
         self._file = place.with_name(f"{place.name}.unfinished.json")
         asked = {"format": FORMAT, "inputs": [dict(one) for one in inputs], "params": dict(params)}
         self._of = json.loads(json.dumps(asked))  # as it is read again
@@ -96,6 +96,11 @@ class Unfinished:
                     f"{_shown(of[name])}; {advice}"
                 )
         return progress
+
+
+def unfinished_path(place: Path) -> Path:
+    """Where the store of a merge into ``place`` lies until it is complete."""
+    return place.with_name(f"{place.name}.unfinished")
 
 
 def added(counts: Mapping[str, int], more: Mapping[str, int]) -> dict[str, int]:

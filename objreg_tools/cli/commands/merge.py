@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from objreg_tools.cli.settings import print_ignored, read_settings
 from objreg_tools.merge.figures import described, evaluate, figures
 from objreg_tools.merge.merge_page import merge_page
 from objreg_tools.merge.merging import Merged, merge
+from objreg_tools.merge.unfinished import unfinished_path
 from objreg_tools.recording import open_recording
 from objreg_tools.recording.inputs import choose_inputs
 from objreg_tools.report.store.store_summary import survey
@@ -90,7 +92,13 @@ def _merged(stores: Sequence[Path], out: Path, params: RegistrarParams) -> Merge
             bar.total = total
             bar.update(done - bar.n)
 
-        return merge(stores, out, params, report)
+        try:
+            return merge(stores, out, params, report)
+        except BaseException:
+            unfinished = unfinished_path(out)
+            if unfinished.exists():
+                bar.write(f"! not complete: the same command goes on with {unfinished}", file=sys.stderr)
+            raise
 
 
 def _truths(given: Sequence[str], robots: Sequence[str]) -> Truths | None:

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 from merge.stores import ASIDE, BESIDE, HERE, PARAMS, two_stores
 
-from objreg_ros.memory.store import StoreError
+from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.registrar import Registrar
 from objreg_tools.cli import group
 from objreg_tools.recording import Record, write_rosbag2
@@ -108,3 +108,18 @@ def test_what_is_there_is_not_written_over(stores: list[Path], tmp_path: Path) -
     with pytest.raises(ValueError, match="expected a place apart from all that is read"):
         merged(stores, stores[0])
     assert (tmp_path / "both.db").read_text() == "mine"
+
+
+def test_what_is_interrupted_says_how_it_goes_on(
+    stores: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise StoreError("both.db.unfinished: cannot write keyframe 2: database or disk is full")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "write_keyframe", full)
+        result = CliRunner().invoke(group, ["merge", *map(str, stores), "-o", str(tmp_path / "both.db")])
+    assert isinstance(result.exception, StoreError)
+    assert f"the same command goes on with {tmp_path}/both.db.unfinished" in result.output
+    page = tmp_path / "both.html"
+    assert merged(stores, tmp_path / "both.db", "--page", str(page)).exit_code == 0 and page.stat().st_size > 10_000
