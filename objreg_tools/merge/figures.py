@@ -153,7 +153,8 @@ def _maps(rows: Sequence[Mapping[str, Any]]) -> str:
         numbers, error = row["sessions"], row["error_cm"]
         which = f"sessions {', '.join(map(str, numbers))} in one frame" if len(numbers) > 1 else f"session {numbers[0]}"
         truth = "" if error is None else f", {error:.1f} cm from the truth"
-        texts.append(f"{which} by {row['kept']} closures{truth}")
+        lost = f", {row['lost']} are of keyframes that are not stored any more" if row["lost"] else ""
+        texts.append(f"{which} by {row['kept']} closures{lost}{truth}")
     return "; ".join(texts) or "no map"
 
 
@@ -163,6 +164,7 @@ def _map_row(one: OneMap, truths: Truths | None) -> dict[str, Any]:
         "sessions": list(one.sessions),
         "keyframes": len(one.poses),
         "kept": one.kept,
+        "lost": one.lost,
         "contradictions": len(one.contradictions),
         "error_cm": None if error is None else error[0],
         "error_of_keyframes": None if error is None else error[1],

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The keyframes of a store as maps: one of all sessions that closures tie together, as the mapper solves it.
 
-A store has no odometry between its keyframes, which is taken to go straight from one to the next. What the mapper does
-not believe, or leaves open, contradicts the rest.
+A store has no odometry between its keyframes. It is taken to go from one to the next in two straight lines that are as
+long as the path was, so that it is as uncertain. Closures of keyframes that are not stored any more are left out: where
+the camera was then is not known. What the mapper does not believe, or leaves open, contradicts the rest.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
+
+import numpy as np
 
 from objreg_mapper.closure_constraint import ImplausibleError
 from objreg_mapper.params import MapperParams
@@ -27,10 +30,11 @@ STEP_NS = 500_000_000  # at most, between two poses of odometry: the mapper take
 
 
 class Placed(NamedTuple):
-    """A keyframe in its session: ``T_session_camera (4, 4)``."""
+    """A keyframe in its session: ``T_session_camera (4, 4)``, ``travelled`` m until then."""
 
     stamp_ns: int
     T_session_camera: Array
+    travelled: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -57,12 +61,16 @@ class Contradiction:
 
 @dataclass(frozen=True)
 class OneMap:
-    """Sessions in one frame, that of the first: ``T_map_camera`` of their keyframes, by session and stamp."""
+    """Sessions in one frame, that of the first: ``T_map_camera`` of their keyframes, by session and stamp.
+
+    The mapper ``kept`` so many closures; ``lost`` ones are of a keyframe that is not stored any more.
+    """
 
     sessions: tuple[int, ...]
     robots: Mapping[int, str]
     poses: Mapping[tuple[int, int], Array]
     kept: int
+    lost: int
     contradictions: tuple[Contradiction, ...]
 
     def error_cm(self, truths: Truths) -> tuple[float, int] | None:
@@ -90,7 +98,7 @@ def tracks_of(store: Store) -> list[Track]:
         track = tracks.setdefault(head["session"], Track(head["session"], head["robot"]))
         last_ns = track.keyframes[-1].stamp_ns if track.keyframes else None
         if T is not None and (last_ns is None or head["stamp_ns"] > last_ns):
-            track.keyframes.append(Placed(head["stamp_ns"], T))
+            track.keyframes.append(Placed(head["stamp_ns"], T, head["travelled"]))
     return [tracks[session] for session in sorted(tracks) if tracks[session].keyframes]
 
 
@@ -119,11 +127,17 @@ def _solved(tracks: Sequence[Track], closures: Sequence[LoopClosure], params: Ma
     numbers = {track.session: number for number, track in enumerate(tracks)}
     for track in tracks:
         graph.begin_session(track.session)
-        for stamp_ns, T in _odometry(track):
+        for stamp_ns, T in odometry_of(track):
             graph.add_odometry(Odometry(T_odom_body=T, stamp_ns=stamp_ns))
-    implausible, given = list[Contradiction](), dict[int, LoopClosure]()
+    implausible, given, lost = list[Contradiction](), dict[int, LoopClosure](), 0
+    stored = {(track.session, keyframe.stamp_ns) for track in tracks for keyframe in track.keyframes}
     for closure in closures:
-        if closure.from_session in numbers and closure.to_session in numbers:
+        ends = (closure.from_session, closure.from_ns), (closure.to_session, closure.to_ns)
+        if closure.from_session not in numbers or closure.to_session not in numbers:
+            continue
+        if not stored.issuperset(ends):
+            lost += 1
+        else:
             nameless = replace(closure, from_robot="", to_robot="")  # sessions say more than robots, which have several
             given[id(nameless)] = closure
             try:
@@ -138,19 +152,30 @@ def _solved(tracks: Sequence[Track], closures: Sequence[LoopClosure], params: Ma
         robots={track.session: track.robot for track in placed},
         poses=poses,
         kept=len(summary.kept),
+        lost=lost,
         contradictions=(*implausible, *_contradictions(summary, given, poses)),
     )
 
 
-def _odometry(track: Track) -> Iterator[Placed]:
-    """The poses of a session's keyframes, with as many between them as there have to be."""
-    yield track.keyframes[0]
+def odometry_of(track: Track) -> Iterator[tuple[int, Array]]:
+    """Stamps and poses (4, 4) of a session's keyframes, with as many between them as the mapper needs."""
+    yield track.keyframes[0][:2]
     for one, other in pairwise(track.keyframes):
-        steps = -(-(other.stamp_ns - one.stamp_ns) // STEP_NS)
-        for k in range(1, steps):
-            stamp_ns = one.stamp_ns + (other.stamp_ns - one.stamp_ns) * k // steps
-            yield Placed(stamp_ns, interpolate(one.T_session_camera, other.T_session_camera, k / steps))
-        yield other
+        out = np.zeros(3) if other.travelled <= one.travelled else _detour(one, other)
+        steps = 2 * max(1, -(-(other.stamp_ns - one.stamp_ns) // (2 * STEP_NS)))
+        for k in range(1, steps if other.stamp_ns - one.stamp_ns > steps else 1):
+            T = np.array(interpolate(one.T_session_camera, other.T_session_camera, k / steps))
+            T[:3, 3] += out * (1.0 - abs(2 * k / steps - 1.0))
+            yield one.stamp_ns + (other.stamp_ns - one.stamp_ns) * k // steps, T
+        yield other[:2]
+
+
+def _detour(one: Placed, other: Placed) -> Array:
+    """How far from the middle of the straight line (3,) m the camera went, for its path to be as long as it was."""
+    line, path = other.T_session_camera[:3, 3] - one.T_session_camera[:3, 3], other.travelled - one.travelled
+    straight = float(np.linalg.norm(line))
+    aside = np.cross(line, np.eye(3)[int(np.argmin(np.abs(line)))]) if straight > 0.0 else np.eye(3)[0]
+    return np.asarray(np.sqrt(max(path**2 - straight**2, 0.0)) / 2.0 * aside / np.linalg.norm(aside))
 
 
 def _poses(

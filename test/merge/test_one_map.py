@@ -3,6 +3,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import inverse
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_tools.merge.one_map import Placed, Track, one_maps, tied, tracks_of, within_sessions
+from objreg_tools.merge.one_map import Placed, Track, odometry_of, one_maps, tied, tracks_of, within_sessions
 from objreg_tools.truth import Truth, Truths
 
 SECOND = 1_000_000_000
@@ -97,3 +98,20 @@ def test_the_sessions_of_a_store_are_read_without_their_keyframes() -> None:
     first, second = tracks_of(store)
     assert (first.session, len(first.keyframes), second.session) == (0, 2, 1)
     assert (inverse(first.keyframes[0].T_session_camera) @ first.keyframes[1].T_session_camera)[0, 3] == 1.0
+
+
+def test_a_closure_of_a_keyframe_that_is_not_stored_any_more_is_counted_and_ties_nothing() -> None:
+    one, other, closures = pair()
+    forgotten = replace(closures[0], from_ns=5 * SECOND, T_from_to=moved(9.0))
+    (found,) = one_maps([one, other], [*closures, forgotten])
+    assert (found.lost, found.kept, found.contradictions) == (1, 3, ())
+
+
+@pytest.mark.parametrize(("x", "travelled"), [(0.0, 20.0), (3.0, 20.0), (3.0, 3.0), (3.0, 0.0)])
+def test_odometry_between_keyframes_is_as_long_as_the_path_was(x: float, travelled: float) -> None:
+    track = Track(0, "", [Placed(0, moved(0.0)), Placed(20 * SECOND, moved(x), travelled)])
+    stamps, poses = zip(*odometry_of(track), strict=True)
+    path = sum(np.linalg.norm(T[:3, 3] - S[:3, 3]) for S, T in pairwise(poses))
+    assert path == pytest.approx(max(travelled, x), rel=1e-6)
+    assert (poses[0] == moved(0.0)).all() and (poses[-1] == moved(x)).all()
+    assert max(b - a for a, b in pairwise(stamps)) <= 0.5 * SECOND
