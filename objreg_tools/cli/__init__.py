@@ -2,7 +2,7 @@
 """The command `objreg`: one file a subcommand, imported only when it is called.
 
 ``cli/commands/<name>.py`` holds the command ``<name>`` (dashes become underscores, and ``try`` is
-``try_.py``) as the function ``command``.
+``try_.py``) as the function ``command``; ``cli/commands/stores/<name>.py`` one that works on a store.
 """
 
 from __future__ import annotations
@@ -52,6 +52,7 @@ SUMMARIES = {
     "doctor": "Check whether a run can work here, and what is missing.",
 }
 FOLDER = Path(__file__).parent / "commands"
+PACKAGES = "", "stores"  # of commands, below that folder
 NAME = "objreg"
 BROKEN, NOTHING, INTERRUPTED, UNHEARD, TERMINATED = 1, 3, 130, 141, 143  # nothing: what was read gave no frame
 BROKEN_INPUT = OSError, ValueError, UnbuiltError  # or kernels that are not built: one line, no traceback
@@ -63,13 +64,13 @@ class LazyGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The commands whose files are there."""
-        return [name for name in SUMMARIES if (FOLDER / f"{_module(name)}.py").exists()]
+        return [name for name in SUMMARIES if _module(name)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command, imported; None if there is none of this name."""
         if cmd_name not in self.list_commands(ctx):
             return None
-        command: click.Command = import_module(f"objreg_tools.cli.commands.{_module(cmd_name)}").command
+        command: click.Command = import_module(_module(cmd_name)).command
         from objreg_tools.cli import paths
 
         return paths.guarded(verbosity.received_by(command))
@@ -102,8 +103,10 @@ class LazyGroup(click.Group):
 
 
 def _module(name: str) -> str:
-    """The file of a command; ``try`` is a word of Python's own."""
-    return name.replace("-", "_") + ("_" if iskeyword(name) else "")
+    """The module of a command, empty where there is none; ``try`` is a word of Python's own."""
+    stem = name.replace("-", "_") + ("_" if iskeyword(name) else "")
+    packages = (package for package in PACKAGES if (FOLDER / package / f"{stem}.py").exists())
+    return next((".".join(filter(None, (f"{__name__}.commands", package, stem))) for package in packages), "")
 
 
 def _print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:

@@ -65,7 +65,7 @@ class _Merging:
         self.damaged = list[str]()
 
     def copy(self) -> None:
-        """Copy the keyframes that are not copied yet, then all closures, which are the first leg."""
+        """Copy the keyframes that are not copied yet, then all closures, which are the first leg, and all vetoes."""
         copied = set(self._store.keyframe_ids())
         for source in self._sources:
             for number, merged in source.numbers():
@@ -76,6 +76,8 @@ class _Merging:
             closures = sum(source.store.counts()["closures"] for source in self._sources)
             kept = (closure for source in self._sources for closure in self._sources.closures(source))
             self._write({"kept": closures}, closures, lambda: self._store.add_closures((one, {}) for one in kept))
+        if not self._store.vetoes():
+            self._store.veto([veto for source in self._sources for veto in self._sources.vetoes(source)])
 
     def _copy_keyframe(self, source: Source, number: int, merged: int) -> None:
         try:

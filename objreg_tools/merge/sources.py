@@ -16,6 +16,7 @@ from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.claim import unwritten_by_others
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
+from objreg_ros.memory.veto import Veto
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_tools.merge.robot_names import renamed_frame, robot_names
 
@@ -99,23 +100,29 @@ class Sources(list[Source]):
 
         An end that another robot's registrar stores is the keyframe of the store which has it, if one has.
         """
-        for closure in source.store.closures():
-            one = self._moment(source, closure.from_robot, closure.from_session, closure.from_frame_id, closure.from_ns)
-            other = self._moment(source, closure.to_robot, closure.to_session, closure.to_frame_id, closure.to_ns)
-            objects = (
-                replace(match, object_id=match.object_id + source.first.landmark) if match.object_id else match
-                for match in closure.objects
-            )
-            yield replace(
-                closure,
-                objects=tuple(objects),
-                from_robot=one.robot,
-                from_session=one.session,
-                from_frame_id=one.frame_id,
-                to_robot=other.robot,
-                to_session=other.session,
-                to_frame_id=other.frame_id,
-            )
+        return (self._renamed(source, closure) for closure in source.store.closures())
+
+    def vetoes(self, source: Source) -> Iterator[Veto]:
+        """What a person withdrew of a store, as `closures`."""
+        return (replace(veto, closure=self._renamed(source, veto.closure)) for veto in source.store.vetoes())
+
+    def _renamed(self, source: Source, closure: LoopClosure) -> LoopClosure:
+        one = self._moment(source, closure.from_robot, closure.from_session, closure.from_frame_id, closure.from_ns)
+        other = self._moment(source, closure.to_robot, closure.to_session, closure.to_frame_id, closure.to_ns)
+        objects = (
+            replace(match, object_id=match.object_id + source.first.landmark) if match.object_id else match
+            for match in closure.objects
+        )
+        return replace(
+            closure,
+            objects=tuple(objects),
+            from_robot=one.robot,
+            from_session=one.session,
+            from_frame_id=one.frame_id,
+            to_robot=other.robot,
+            to_session=other.session,
+            to_frame_id=other.frame_id,
+        )
 
     def _moment(self, source: Source, robot: str, session: int | None, frame_id: str, stamp_ns: int) -> Moment:
         if robot not in source.names and (found := self._elsewhere(source, robot, stamp_ns)) is not None:

@@ -157,7 +157,8 @@ class Tying:
     def _search_for(self, number: int, leg: Leg, track: CameraTrack) -> Counter[str]:
         keyframe, named = self._store.keyframe(number), tuple(self._store.sightings(number))
         candidates = self._ties.index.query(named, leg.hidden) if named else []
-        means = Means(self._store, self._method, self._gate, track.confirmation, self._pools.fitting())
+        pool, vetoes = self._pools.fitting(), self._ties.vetoes
+        means = Means(self._store, self._method, self._gate, track.confirmation, pool, vetoes)
         found = Search(keyframe, track.thinning, ENDLESS, means, self._params).run(candidates)
         track.wait_for_proof(found.accepted, keyframe, named)
         for decision in found.waiting:

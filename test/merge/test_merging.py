@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from merge.stores import AWAY, BESIDE, HERE, PARAMS, store, two_stores
+from objreg_ros.data.closure_id import closure_id
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.memory.codec import scene_row
@@ -52,6 +53,23 @@ def test_closures_between_stores_have_the_true_pose_and_name_both_robots(merged:
     assert rotation < 1.0 and distance < 2.0
     assert first.robots == ("east", "west") and (first.from_session, first.to_session) == (0, 1)
     assert merged.counts["closures"] == len(between) and merged.counts["searched"] == 2
+
+
+def test_what_was_withdrawn_in_a_store_stays_so_and_comes_back_with_undo(tmp_path: Path) -> None:
+    paths = two_stores(tmp_path)
+    (gone, *_) = closures(paths[1])
+    registrar = Registrar(PARAMS.replaced(store=str(paths[1])))
+    registrar.veto([closure_id(gone)])
+    registrar.close()
+    both = merge(paths, tmp_path / "both.db", PARAMS).path
+    ends = lambda one: (one.from_ns, one.to_ns)  # noqa: E731
+    assert ends(gone) not in map(ends, closures(both))
+    registrar = Registrar(PARAMS.replaced(store=str(both)))
+    (vetoed,) = registrar.vetoed
+    assert ends(vetoed) == ends(gone) and vetoed.from_session == 1
+    (again,) = registrar.undo_veto([closure_id(vetoed)]).closures
+    registrar.close()
+    assert ends(again) == ends(gone) and ends(again) in map(ends, closures(both))
 
 
 def test_closures_of_each_store_are_kept(merged: Merged, folder: Path) -> None:

@@ -14,6 +14,7 @@ from objreg_ros.data.closures import ObjectMatch, Reason
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.closure import WaitingClosure
+from objreg_ros.registrar.consistency import Standpoint
 from objreg_tools.merge import ties
 from objreg_tools.merge.merging import merge
 from objreg_tools.merge.ties import FoundTies, Leg, Tying, legs_of
@@ -43,6 +44,8 @@ def waiting(source: int, target: int, instances: tuple[int, ...] = (1,)) -> Wait
         target_id=target + 1,
         pairs=tuple((k, k) for k in instances),
         R_there_here=np.eye(3),
+        here=Standpoint(closure.to_ns, closure.to_session or 0, np.eye(4), 0.0),
+        there=Standpoint(closure.from_ns, closure.from_session or 0, np.eye(4), 0.0),
     )
 
 

@@ -13,7 +13,8 @@ from report.places import cup_and_book
 
 from objreg_ros.memory.store import Store
 from objreg_tools.cli import group
-from objreg_tools.cli.commands import export, inspect
+from objreg_tools.cli.commands import inspect
+from objreg_tools.cli.commands.stores import export
 
 
 def test_a_store_is_described_drawn_and_written_as_a_page(tmp_path: Path) -> None:
@@ -51,6 +52,6 @@ def test_a_damaged_keyframe_is_named_and_the_others_are_exported(
         tell("keyframe 5 is left out: damaged")
         yield folder / "map.json"
 
-    monkeypatch.setattr("objreg_tools.cli.commands.export.export", damaged)
+    monkeypatch.setattr("objreg_tools.cli.commands.stores.export.export", damaged)
     result = CliRunner().invoke(export.command, ["place.db", str(tmp_path / "out")], catch_exceptions=False)
     assert result.exit_code == 0 and "! keyframe 5 is left out: damaged" in result.output

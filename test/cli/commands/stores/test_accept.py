@@ -17,7 +17,7 @@ from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.registrar import Registrar
 from objreg_tools.cli import group
-from objreg_tools.cli.commands import accept as module
+from objreg_tools.cli.commands.stores import accept as module
 
 SECOND = 1_000_000_000
 

@@ -13,7 +13,8 @@ from report.places import at, store_of, tying
 from objreg_ros.data.closure_id import closure_id
 from objreg_ros.memory.store import Store
 from objreg_tools.cli import group
-from objreg_tools.cli.commands import inspect, veto
+from objreg_tools.cli.commands import inspect
+from objreg_tools.cli.commands.stores import veto
 from objreg_tools.report.store.store_page import store_page
 from objreg_tools.report.store.store_summary import survey
 

@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 from merge.stores import ASIDE, BESIDE, HERE, PARAMS, two_stores
 
 from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.store_file import SCHEMA_VERSION
 from objreg_ros.registrar.registrar import Registrar
 from objreg_tools.cli import group
 from objreg_tools.recording import Record, write_rosbag2
@@ -97,7 +98,7 @@ def test_a_newer_store_is_refused_with_both_versions(stores: list[Path], tmp_pat
     with newer.open("r+b") as file:
         file.seek(60)
         file.write((99).to_bytes(4, "big"))
-    with pytest.raises(StoreError, match="expected schema version 7 or older, got 99"):
+    with pytest.raises(StoreError, match=f"expected schema version {SCHEMA_VERSION} or older, got 99"):
         merged([stores[1], newer], tmp_path / "both.db")
 
 
