@@ -173,9 +173,11 @@ class Store:
         self._recent.keep(keyframe)
         return keyframe
 
-    def sightings(self, keyframe_id: int | None = None) -> Iterator[Sighting]:
-        """Every stored object without its points, or those of one keyframe, oldest first."""
-        only = "" if keyframe_id is None else f" WHERE keyframe = {int(keyframe_id)}"
+    def sightings(self, keyframe_id: int | None = None, landmark: int | None = None) -> Iterator[Sighting]:
+        """Every stored object without its points, or those of one keyframe or of one landmark, oldest first."""
+        asked = {"keyframe": keyframe_id, "landmark": landmark}
+        terms = [f"{column} = {int(number)}" for column, number in asked.items() if number is not None]
+        only = f" WHERE {' AND '.join(terms)}" if terms else ""
         with self._reporting("read the objects", LEFT):
             for row in self._connection.execute(f"SELECT * FROM object{only} ORDER BY id"):
                 if row["keyframe"] not in self._heads:
