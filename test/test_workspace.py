@@ -17,7 +17,7 @@ import pytest
 MOST_S = 1800.0  # of a build: a Raspberry Pi takes ten minutes for the messages
 NEEDED = ("ament_cmake", "rosidl_default_generators")  # what builds messages, in a prefix that the environment names
 MESSAGES = (
-    "import objreg_msgs; from objreg_msgs.msg import LoopClosure; from objreg_msgs.srv import Relocalise; "
+    "import objreg_msgs; from objreg_msgs.msg import LoopClosure; from objreg_msgs.srv import Relocalise, Where; "
     "print(objreg_msgs.__file__)"
 )
 KERNELS = (

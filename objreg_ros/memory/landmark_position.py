@@ -13,12 +13,13 @@ PRIOR = 3.0  # sightings that the deviation assumed beforehand counts as much as
 
 
 def position_of(xyz: Array, extents: Array) -> tuple[Array, Array]:
-    """The position (3,) m and its covariance (3, 3) m^2 by the middles ``xyz (N, 3)`` of N >= 1 sightings, oldest first.
+    """The position (3,) m and its covariance (3, 3) m^2 by the middles ``xyz (N, 3)`` of N >= 1 sightings.
 
-    All in one frame; ``extents (N,)`` m. An object that was moved is where it was seen last: what lies farther from that
-    than two sightings of one object may is left out. The covariance says how far off one sighting may be, not the mean
-    of them: the side that is seen and the drift of the map err alike in many. It is the scatter, with a prior of a third
-    of the reach, as of an inverse Wishart distribution. ValueError without a sighting.
+    All in one frame, the oldest first; ``extents (N,)`` m. An object that was moved is where it was seen last: what
+    lies farther from that than two sightings of one object may is left out. The covariance says how far off one
+    sighting may be, not the mean of them: the side that is seen and the drift of the map err alike in many. It is the
+    scatter, with a prior of a third of the reach, as of an inverse Wishart distribution. ValueError without a
+    sighting.
     """
     if len(xyz) == 0 or xyz.shape != (len(extents), 3):
         raise ValueError(f"expected an extent for each of at least 1 position, got {xyz.shape} and {extents.shape}")

@@ -15,6 +15,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from objreg_ros.bridge.messages import known_objects_msg
 from objreg_ros.bridge.messages.markers import MarkerScene
 from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.params import ManagedParams
@@ -44,6 +45,7 @@ PATIENCE_S = 1.0  # a newer keyframe waits before the search in hand is cut shor
 WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
 WAITING_BYTES = 200_000_000  # most memory of those
 BEHIND = 64  # keyframes of a robot that may wait for their search: those of a link that was away come all at once
+MOST_ASKING = 16  # callers of ~/where; each has a thread, and further ones are refused
 GIVING_WAY = 10  # niceness of the search in a process of its own: the next image must not wait for it
 
 
@@ -83,7 +85,7 @@ class RegistrarNode(FramesNode):
 
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._announcing = threading.Lock(), threading.Lock()
-        self._unsearched, self._scene = 0, MarkerScene()
+        self._unsearched, self._asking, self._scene = 0, 0, MarkerScene()
         self._shown_ns = 0  # of the newest keyframe
         self._may_reset = self.settings.of(PeerParams).allow_remote_reset
         self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
@@ -102,6 +104,8 @@ class RegistrarNode(FramesNode):
         self.serve_aside("~/save", self._settle_and_save)
         self.serve_vetoes(self._veto)
         self.serve_enable("frames")
+        if known_objects_msg.Where is not None:
+            self.create_service(known_objects_msg.Where, "~/where", self._where, callback_group=self.apart)
         if self._robot:
             asked = self.settings.of(ExchangeParams)
             self._exchange = Exchange(self._registrar, self._robot, 1000.0 * asked.exchange_kilobytes)
@@ -269,6 +273,22 @@ class RegistrarNode(FramesNode):
             self._scene.clear()
         self._whereabouts.look()
         return True, "forgot every keyframe" + (f"; what was stored is in {aside}" if aside else "")
+
+    async def _where(self, request: Any, response: Any) -> Any:
+        """`Registrar.where`, once the search in hand is over."""
+        if self._asking >= MOST_ASKING:
+            response.message = f"~/where: call again: {MOST_ASKING} earlier calls are not done yet"
+            return response
+        self._asking += 1
+        try:
+            found = await self.aside(lambda: self._registrar.where(request.label))
+        except (ValueError, OSError) as error:
+            response.message = str(error)
+            return response
+        finally:
+            self._asking -= 1
+        robot = self._robot or self.get_namespace().strip("/")
+        return known_objects_msg.fill(response, found, self.odom_frame, robot)
 
     def _settle_and_save(self) -> tuple[bool, str]:
         """Whether it could be, and where it is or what was in the way. The last keyframe comes after all others.

@@ -12,6 +12,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from objreg_ros.memory.veto import Veto
 from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks
 from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, Search
 from objreg_ros.registrar.closure import Decision, observations, rejected
+from objreg_ros.registrar.known_objects import KnownObjects, objects_called
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
 from objreg_ros.registrar.params import RegistrarParams
@@ -82,6 +84,16 @@ class Registrar:
         """The landmarks of late whose position is in the frame of the newest keyframe's session, at most `RECENT`."""
         with self._lock:
             return self._recollection.landmarks.recent(self._session, RECENT)
+
+    def where(self, label: str) -> KnownObjects:
+        """Where the objects of a label are in the frame of the newest keyframe's session, as `objects_called` says it.
+
+        StoreError where the store cannot be read.
+        """
+        with self._lock:
+            sightings = partial(self._store.sightings, None)
+            known = self._tracks.followed.keyframer.session == self._session  # else it is of a newer session
+            return objects_called(label, self.landmarks, sightings, self._session, self.relocalised if known else None)
 
     @property
     def tracked(self) -> tuple[int, Array] | None:

@@ -10,6 +10,7 @@ import click
 
 from objreg_tools.cli.paths import InputText, ModelText, OutputPath, RecordingPath, SettingsPath
 from objreg_tools.recording.inputs import GRAPH_TOPICS
+from objreg_tools.report.exports.occupancy_grid import BAND_M, CELL_M
 
 recording = click.argument("recording", type=RecordingPath(path_type=Path))
 remap = click.option(
@@ -100,3 +101,19 @@ def scene_files(command: Callable) -> Callable:
     mcap = click.option("--mcap", type=file, metavar="FILE.mcap", help="Write the run here for Foxglove.")
     rerun = click.option("--rerun", type=file, metavar="FILE.rrd", help="Write the run here for the Rerun viewer.")
     return rerun(mcap(command))
+
+
+def of_grid(command: Callable) -> Callable:
+    """How the grid of a map is made: ``cell`` and ``band``."""
+    cell = click.option(
+        "--cell", type=float, default=CELL_M, show_default=True, help="The side of a cell of the grid of --map, m."
+    )
+    band = click.option(
+        "--band",
+        type=(float, float),
+        default=BAND_M,
+        show_default=True,
+        metavar="LOW HIGH",
+        help="The heights above the floor, m, between which something is in the way on the grid of --map.",
+    )
+    return cell(band(command))

@@ -12,6 +12,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_tools.cli.verbosity import aside
 from objreg_tools.recording import Recording
 from objreg_tools.report.exports.map_files import MapFiles
+from objreg_tools.report.exports.occupancy_grid import BAND_M, CELL_M, GridParams
 from objreg_tools.report.exports.run_scene import scene_of
 from objreg_tools.report.exports.scene_files import SceneFiles
 from objreg_tools.report.run.pictures import Album
@@ -37,10 +38,15 @@ class Outputs:
         mcap: Path | None,
         tum_before: Path | None = None,
         tum_truth: Path | None = None,
+        cell: float = CELL_M,
+        band: tuple[float, float] = BAND_M,
     ) -> Outputs:
-        """Those of the options. ValueError for a voxel that is none."""
+        """Those of the options; a ``cloud`` without an ending is a folder. ValueError for a bad voxel or grid."""
+        is_folder = cloud is not None and (cloud.is_dir() or not cloud.suffix)
+        file, folder = (None, cloud) if is_folder else (cloud, None)
+        grid = GridParams(cell, *band)
         try:
-            files = MapFiles(tum, kitti, g2o, cloud, voxel, tum_before, tum_truth)
+            files = MapFiles(tum, kitti, g2o, file, voxel, tum_before, tum_truth, folder, grid)
         except ValueError as error:
             raise ValueError(f"--voxel: {error}") from error
         return cls(files, SceneFiles(rerun, mcap))
@@ -70,7 +76,7 @@ class Outputs:
 
     def remembering(self, registrar: RegistrarParams, folder: str) -> RegistrarParams:
         """With a store in a file, in ``folder`` unless it has one, where the map is made of its keyframes."""
-        if self.files.cloud is None or registrar.store:
+        if (self.files.cloud is None and self.files.folder is None) or registrar.store:
             return registrar
         return registrar.replaced(store=str(Path(folder, "keyframes.db")))
 

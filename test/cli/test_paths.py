@@ -31,6 +31,7 @@ NAMES_NO_FILE = {
     "size",
     "lens",
     "settings",
+    "label",  # of where
     *("namespace", "robots", "exchange", "sources", "enclaves", "remap", "robot", "source"),  # of policy
 }
 """Texts of options that are never opened."""

@@ -14,7 +14,7 @@ from tqdm import tqdm
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_tools.cli import options
 from objreg_tools.cli.outputs import Outputs
-from objreg_tools.cli.paths import STANDARD_OUTPUT, GraphPath, OutputPath
+from objreg_tools.cli.paths import STANDARD_OUTPUT, GraphPath, MapPath, OutputPath
 from objreg_tools.cli.recorded import Opened, RecordedOptions
 from objreg_tools.cli.run_output import (
     exit_code,
@@ -28,7 +28,7 @@ from objreg_tools.cli.run_output import (
 from objreg_tools.cli.settings import print_ignored
 from objreg_tools.offline.run import Run
 from objreg_tools.recording.troubles import troubles
-from objreg_tools.report.exports.map_files import VOXEL_M
+from objreg_tools.report.exports.voxel_cloud import VOXEL_M
 from objreg_tools.report.pair.pair_command import OF_RUN, passed_on
 from objreg_tools.report.run.findings import as_json, find, verdict
 from objreg_tools.report.run.pictures import Album
@@ -52,7 +52,16 @@ FILE = OutputPath(dir_okay=False, path_type=Path)
     help="Write the corrected pose graph here, without the constraints that were pruned, and the times of its vertices "
     "beside it, as FILE.times.csv.",
 )
-@click.option("--map", "cloud", type=FILE, metavar="FILE.ply", help="Write the corrected cloud of the keyframes here.")
+@options.of_grid
+@click.option(
+    "--map",
+    "cloud",
+    type=MapPath(path_type=Path),
+    metavar="FOLDER|FILE.ply",
+    help="Write the corrected map into this folder: map.pgm with map.yaml, a grid as Nav2's map_server reads it, the "
+    "cloud map.ply, and the objects with their covariances, landmarks.json. A name with an ending is a file, "
+    "into which the cloud alone is written.",
+)
 @click.option(
     "--voxel",
     type=float,

@@ -23,12 +23,21 @@ from objreg_ros.memory.store_file import StoreError
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.whole_file import write_whole
+from objreg_tools.report.exports.map_folder import NAMES, write_map_folder
+from objreg_tools.report.exports.occupancy_grid import GridParams
+from objreg_tools.report.exports.placed_keyframes import placed_in_store
 from objreg_tools.report.exports.ply import write_ply
+from objreg_tools.report.exports.voxel_cloud import VOXEL_M
 
 MOST_BYTES = 200  # of a label in the name of a file, which may have 255 in all
 
 
-def export(path: str | Path, folder: str | Path, notify: Callable[[str], None] = lambda line: None) -> Iterator[Path]:
+def export(
+    path: str | Path,
+    folder: str | Path,
+    notify: Callable[[str], None] = lambda line: None,
+    grid: GridParams | None = None,
+) -> Iterator[Path]:
     """Write the store at ``path`` into ``folder`` and yield each file as it is written. The store is not changed.
 
     ``objects/<landmark>_<label>/keyframe_<id>_<instance>.ply`` is one view of an object and
@@ -36,8 +45,8 @@ def export(path: str | Path, folder: str | Path, notify: Callable[[str], None] =
     since that frame may be UTM's, where a float steps by half a metre. ``map.json`` holds keyframes with their objects
     (``frames`` is how many showed one, ``density`` in points per square metre of it), the landmarks that those are of,
     closures, those that a person ``vetoed``, and the ids of the keyframes that are ``damaged``: they are left out, and
-    ``notify`` receives the reason.
-    StoreError (an OSError) if it is no store, OSError if there is anything in the folder already or it cannot be
+    ``notify`` receives the reason. With a ``grid`` the corrected map of the store is there too, as `write_map_folder`
+    writes it. StoreError (an OSError) if it is no store, OSError if there is anything in the folder already or it cannot be
     written: then nothing of the export remains.
     """
     folder = Path(folder)
@@ -46,6 +55,9 @@ def export(path: str | Path, folder: str | Path, notify: Callable[[str], None] =
     try:
         with _all_or_nothing(folder):
             yield from _write(store, folder, notify)
+            if grid is not None:
+                placed = placed_in_store(Path(path), notify)
+                yield from write_map_folder(folder, placed, grid, VOXEL_M, notify)
     finally:
         store.close()
 
@@ -87,7 +99,8 @@ def _all_or_nothing(folder: Path) -> Iterator[None]:
         for name in ("objects", "contexts"):
             shutil.rmtree(folder / name, ignore_errors=True)
         with suppress(OSError):
-            (folder / "map.json").unlink(missing_ok=True)
+            for name in ("map.json", *NAMES):
+                (folder / name).unlink(missing_ok=True)
             if not was_there:
                 folder.rmdir()
         raise

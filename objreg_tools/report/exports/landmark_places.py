@@ -24,8 +24,8 @@ from objreg_tools.report.exports.placed_keyframes import PlacedKeyframes
 class LandmarkPlace:
     """A landmark on a map: ``xyz (3,)`` m of its middle and ``covariance (3, 3)`` m^2 as `position_of` has them.
 
-    ``extent`` m is the median diagonal of the box around it, ``sightings`` in how many keyframes of the map it was seen,
-    for the last time at ``last_seen_ns`` in ``session`` of ``robot``.
+    ``extent`` m is the median diagonal of the box around it. It was seen in so many keyframes of the map
+    (``sightings``), for the last time at ``last_seen_ns`` in ``session`` of ``robot``.
     """
 
     landmark: int

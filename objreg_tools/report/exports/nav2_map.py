@@ -26,8 +26,7 @@ def write_nav2_map(picture: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
     grey = np.full(grid.cells.shape, UNKNOWN_GREY, np.uint8)
     for value, shade in GREY.items():
         grey[grid.cells == value] = shade
-    height, width = grey.shape
-    write_whole(picture, b"P5\n%d %d\n255\n" % (width, height) + grey[::-1].tobytes())
+    write_whole(picture, f"P5\n{grey.shape[1]} {grey.shape[0]}\n255\n".encode() + grey[::-1].tobytes())
     facts = picture.with_suffix(".yaml")
     write_whole(facts, yaml_text(picture.name, grid))
     return picture, facts

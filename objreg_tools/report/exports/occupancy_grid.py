@@ -18,6 +18,7 @@ from objreg_ros.geometry import transform
 from objreg_ros.sensor import depth_noise, depth_sigma
 
 CELL_M = 0.05
+BAND_M = (0.1, 1.5)  # above the floor: from what a small wheel climbs to the top of a service robot
 LEAST_CELL_M, MOST_CELL_M = 0.01, 1.0
 LAYER_M = 0.1
 DEEPEST_M = 100.0  # below the floor
@@ -41,8 +42,8 @@ class GridParams:
     """
 
     cell: float = CELL_M
-    low: float = 0.1
-    high: float = 1.5
+    low: float = BAND_M[0]
+    high: float = BAND_M[1]
 
     def __post_init__(self) -> None:
         if not LEAST_CELL_M <= self.cell <= MOST_CELL_M:
@@ -110,23 +111,24 @@ class GridMaker:
             np.add(part, 1, out=part, where=mask & (part < np.iinfo(np.uint16).max))
 
     def grid(self) -> OccupancyGrid:
-        """What is known, cut to where that is. Occupied where any voxel is, free where the floor or half of them are.
+        """What is known, cut to where that is; one unknown cell where nothing is.
 
-        Where more views see below the floor than see the floor, as over stairs, it is not free, nor beside that where no
-        floor is seen. One unknown cell where
-        nothing is known.
+        A cell is occupied where any voxel of it is. It is free where the floor is seen, or where rays pass through the
+        lowest voxel and half of all: those above a worktop say nothing of what is below it. Where more views see below
+        the floor than see it, as over stairs, it is not free, nor beside that where no floor is seen.
         """
         evidence = HIT * self._hits - PASS * self._passes
         occupied = ((self._hits > 0) & (evidence > 0.0)).any(axis=2)
-        through = ((self._passes > 0) & (evidence < 0.0)).sum(axis=2)
+        through = (self._passes > 0) & (evidence < 0.0)
+        clear = through[..., 0] & (2 * through.sum(axis=2) >= self._layers)
         pits = self._drops > self._floors
         beside = cv2.dilate(pits.astype(np.uint8), np.ones((EDGE, EDGE), np.uint8)) > 0
-        free = ((self._floors > 0) & ~pits) | ((2 * through >= self._layers) & ~beside)
+        free = ((self._floors > 0) & ~pits) | (clear & ~beside)
         cells = np.where(occupied, OCCUPIED, np.where(free, FREE, UNKNOWN)).astype(np.int8)
         rows, columns = (np.flatnonzero((cells != UNKNOWN).any(axis=axis)) for axis in (1, 0))
         first_row, first_column = (int(k[0]) if len(k) else 0 for k in (rows, columns))
         last_row, last_column = (int(k[-1]) + 1 if len(k) else 1 for k in (rows, columns))
-        x, y = ((self._corner + (first_column, first_row)) * self.cell).tolist()
+        x, y = ((self._corner + np.array([first_column, first_row])) * self.cell).tolist()
         return OccupancyGrid(cells[first_row:last_row, first_column:last_column], (x, y), self.cell)
 
     def _margin(self, distance: Array) -> Array:
@@ -143,7 +145,7 @@ class GridMaker:
         return hits, floors
 
     def _cast(self, window: _Window, camera: Array, rays: Array, ends: Array, band: tuple[float, float]) -> Array:
-        """The voxels of rays (N, 3) from the camera to that share (N,) of them, where they are in the band."""
+        """The voxels of rays (N, 3) from the camera to that share (N,) of them, in the band."""
         low, high = (self._floor + height - camera[2] for height in band)
         rise = np.where(np.abs(rays[:, 2]) < 1e-9, 1e-9, rays[:, 2])
         bounds = np.sort(np.stack([low / rise, high / rise]), axis=0)
@@ -172,7 +174,7 @@ class _Window:
         high = np.ceil((camera[:2] + REACH_M) / cell).astype(np.int64) - corner + 1
         (first_x, first_y), (last_x, last_y) = (np.clip(side, 0, shape[1::-1]).tolist() for side in (low, high))
         self.rows, self.columns = slice(first_y, last_y), slice(first_x, last_x)
-        self._first = corner + (first_x, first_y)
+        self._first = corner + np.array([first_x, first_y])
 
     def mask(self, layers: int) -> Array:
         """Nothing is marked yet: (rows, columns, layers)."""

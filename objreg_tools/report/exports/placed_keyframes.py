@@ -22,7 +22,7 @@ SAME_POSE = 1e-6  # m, and of the entries of a rotation
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedKeyframes:
-    """The keyframes of the store at ``path`` that are among the ``frames`` of a map, the oldest first, as often as asked.
+    """The keyframes of the store at ``path`` that are among the ``frames`` of a map, the oldest first.
 
     ``by_odometry`` takes those alone whose pose odometry gave, or our own tracking; all where it is None.
     """

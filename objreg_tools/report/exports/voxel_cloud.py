@@ -8,6 +8,7 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_ros.geometry import transform
 
+VOXEL_M = 0.02  # finer than what a depth camera errs by at 2 m
 MOST_POINTS = 1_000_000  # of 64 bytes: to merge them takes 300 MB; at 2 cm they cover some 300 m^2
 BATCH = 250_000  # points that are taken before they are merged
 LEAST_VOXEL_M, MOST_VOXEL_M = 1e-3, 10.0

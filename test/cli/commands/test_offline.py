@@ -253,7 +253,7 @@ def test_no_trajectory_is_asked_for_and_none_is_told(model: Path, tmp_path: Path
     assert summary["odometry"] is None and summary["trajectory"] is None
 
 
-@pytest.mark.parametrize("option", ["--tum", "--kitti", "--g2o", "--map"])
+@pytest.mark.parametrize("option", ["--tum", "--kitti", "--g2o"])
 def test_a_map_that_cannot_be_written_is_refused_before_the_run(option: str, tmp_path: Path) -> None:
     with pytest.raises(OSError, match=f"{option}: expected an existing folder .*nowhere, got none"):
         offline(tmp_path / "no_recording", option, tmp_path / "nowhere" / "out")
