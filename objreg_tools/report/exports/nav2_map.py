@@ -26,7 +26,8 @@ def write_nav2_map(picture: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
     grey = np.full(grid.cells.shape, UNKNOWN_GREY, np.uint8)
     for value, shade in GREY.items():
         grey[grid.cells == value] = shade
-    write_whole(picture, f"P5\n{grey.shape[1]} {grey.shape[0]}\n255\n".encode() + grey[::-1].tobytes())
+    rows, columns = grid.cells.shape[0], grid.cells.shape[1]
+    write_whole(picture, f"P5\n{columns} {rows}\n255\n".encode() + grey[::-1].tobytes())
     facts = picture.with_suffix(".yaml")
     write_whole(facts, yaml_text(picture.name, grid))
     return picture, facts
