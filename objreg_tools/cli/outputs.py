@@ -41,9 +41,11 @@ class Outputs:
         cell: float = CELL_M,
         band: tuple[float, float] = BAND_M,
     ) -> Outputs:
-        """Those of the options; a ``cloud`` without an ending is a folder. ValueError for a bad voxel or grid."""
+        """Those of the options; a ``cloud`` without an ending is a folder. ValueError for a bad one."""
         is_folder = cloud is not None and (cloud.is_dir() or not cloud.suffix)
         file, folder = (None, cloud) if is_folder else (cloud, None)
+        if folder is not None and folder.exists() and not folder.is_dir():
+            raise ValueError(f"--map: expected a folder, or a file that ends with .ply, got the file {folder}")
         grid = GridParams(cell, *band)
         try:
             files = MapFiles(tum, kitti, g2o, file, voxel, tum_before, tum_truth, folder, grid)

@@ -97,16 +97,6 @@ class GraphPath(OutputPath):
         yield from (value, times_file(value)) if value.name else (value,)
 
 
-class MapPath(OutputPath):
-    """A cloud, or where the name has no ending a folder, of which the files are written."""
-
-    def files(self, value: Path) -> Iterator[Path]:
-        """See `OutputPath.files`. OSError for a folder's name that a file has."""
-        if value.name and not value.suffix and value.exists() and not value.is_dir():
-            raise OSError(f"--map: expected a folder, or a file that ends with .ply, got the file {value}")
-        yield value
-
-
 INPUTS = (InputPath, InputText)
 
 

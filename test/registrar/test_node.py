@@ -27,7 +27,7 @@ from objreg_ros.diagnostics import by_key
 from objreg_ros.geometry import pose
 from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.node import Job, RegistrarNode
+from objreg_ros.registrar.node import MOST_ASKING, Job, RegistrarNode
 from objreg_ros.registrar.outcome import Outcome
 
 CUP = (box("cup", (0, 0, 1)),)
@@ -381,3 +381,18 @@ def test_keyframes_are_exchanged_by_one_robot_that_its_namespace_names(
             RegistrarNode()
     finally:
         rclpy.try_shutdown()
+
+
+def test_where_is_answered_by_a_thread_and_refused_where_too_many_ask(make: Making) -> None:
+    node = make()
+    executor = rclpy.get_global_executor()
+    executor.add_node(node)
+    asked = executor.create_task(node._where(SimpleNamespace(label="cup"), SimpleNamespace()))
+    rclpy.spin_until_future_complete(node, asked, timeout_sec=30.0)
+    answer = asked.result()
+    assert not answer.success and answer.message == "no cup is known; there are: no objects yet"
+    assert answer.header.frame_id == "odom" and answer.landmarks == [] and node._asking == 0
+    node._asking = MOST_ASKING
+    with pytest.raises(StopIteration) as refused:
+        node._where(SimpleNamespace(label="cup"), SimpleNamespace(success=False)).send(None)
+    assert refused.value.value.message.startswith("~/where: call again: 16 earlier calls")

@@ -14,7 +14,7 @@ from tqdm import tqdm
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_tools.cli import options
 from objreg_tools.cli.outputs import Outputs
-from objreg_tools.cli.paths import STANDARD_OUTPUT, GraphPath, MapPath, OutputPath
+from objreg_tools.cli.paths import STANDARD_OUTPUT, GraphPath, OutputPath
 from objreg_tools.cli.recorded import Opened, RecordedOptions
 from objreg_tools.cli.run_output import (
     exit_code,
@@ -56,7 +56,7 @@ FILE = OutputPath(dir_okay=False, path_type=Path)
 @click.option(
     "--map",
     "cloud",
-    type=MapPath(path_type=Path),
+    type=OutputPath(path_type=Path),
     metavar="FOLDER|FILE.ply",
     help="Write the corrected map into this folder: map.pgm with map.yaml, a grid as Nav2's map_server reads it, the "
     "cloud map.ply, and the objects with their covariances, landmarks.json. A name with an ending is a file, "

@@ -279,3 +279,18 @@ def test_a_run_of_which_no_frame_got_through_says_why_and_ends_with_three(model:
     result = CliRunner().invoke(command, words, catch_exceptions=False, standalone_mode=False)
     assert result.return_value == 3 and "! no frame got through: 3 malformed_depth" in result.output
     assert json.loads(file.read_text())["findings"][0]["anchor"] == "no-frame-got-through"
+
+
+def test_a_map_without_an_ending_is_a_folder_of_grid_cloud_and_landmarks(model: Path, tmp_path: Path) -> None:
+    words = ("--odometry", "drift:1", "--map", tmp_path / "map", "--voxel", 0.05, "--band", 0.2, 1.0)
+    output = offline(tum_folder(tmp_path / "tum", frames=4), "--model", model, *words)
+    assert {"map.ply", "landmarks.json"} <= {file.name for file in (tmp_path / "map").iterdir()}
+    assert f"map: {tmp_path / 'map' / 'landmarks.json'}: " in output
+
+
+def test_a_folder_for_the_map_that_is_a_file_and_a_grid_that_is_none_are_refused_before_the_run(tmp_path: Path) -> None:
+    (tmp_path / "map").write_text("")
+    with pytest.raises(ValueError, match=r"--map: expected a folder, or a file that ends with \.ply, got the file"):
+        offline(tmp_path / "no_recording", "--map", tmp_path / "map")
+    with pytest.raises(ValueError, match="--cell: expected"):
+        offline(tmp_path / "no_recording", "--map", tmp_path / "other", "--cell", 0)

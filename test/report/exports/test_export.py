@@ -17,6 +17,7 @@ from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_tools.report.exports.export import export
+from objreg_tools.report.exports.occupancy_grid import GridParams
 from report.ply_reader import positions, read_ply
 
 
@@ -136,3 +137,19 @@ def test_a_folder_that_holds_something_is_refused_and_left_as_it_is(tmp_path: Pa
     with pytest.raises(OSError, match=r"used: expected a new or empty folder, got one that .* choose another"):
         next(export(tmp_path / "place.db", used))
     assert [(file.name, file.stat().st_mtime_ns) for file in used.iterdir()] == [("map.json", before)]
+
+
+def test_an_export_with_its_map_has_that_beside_the_rest_or_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError("no space left")
+
+    _store_of(tmp_path / "place.db", "cup")
+    written = list(export(tmp_path / "place.db", tmp_path / "out", grid=GridParams()))
+    assert {"map.json", "map.pgm", "map.yaml", "map.ply", "landmarks.json"} <= {file.name for file in written}
+    assert all(file.is_file() for file in written)
+    monkeypatch.setattr("objreg_tools.report.exports.map_folder.landmark_places", refuse)
+    with pytest.raises(OSError, match="no space left"):
+        list(export(tmp_path / "place.db", tmp_path / "again", grid=GridParams()))
+    assert not (tmp_path / "again").exists()
