@@ -68,7 +68,7 @@ NODES: dict[str, Access] = {
             *("markers", "relocalised", "initialpose"),
         ),
         reads=FRAMES,
-        serves=("~/relocalise", "~/reset", "~/save", "~/enable"),
+        serves=("~/relocalise", "~/where", "~/reset", "~/save", "~/enable"),
     ),
     "keyframer": MANAGED + Access(writes=("keyframes",), reads=FRAMES),
     "blackbox": MANAGED
