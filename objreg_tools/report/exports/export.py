@@ -46,8 +46,8 @@ def export(
     (``frames`` is how many showed one, ``density`` in points per square metre of it), the landmarks that those are of,
     closures, those that a person ``vetoed``, and the ids of the keyframes that are ``damaged``: they are left out, and
     ``notify`` receives the reason. With a ``grid`` the corrected map of the store is there too, as `write_map_folder`
-    writes it. StoreError (an OSError) if it is no store, OSError if there is anything in the folder already or it cannot be
-    written: then nothing of the export remains.
+    writes it. StoreError (an OSError) if it is no store, OSError if there is anything in the folder already or it
+    cannot be written: then nothing of the export remains.
     """
     folder = Path(folder)
     _refuse_used(folder)
