@@ -48,7 +48,7 @@ def test_a_store_is_exported(tmp_path: Path) -> None:
 def test_a_damaged_keyframe_is_named_and_the_others_are_exported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def damaged(store: Path, folder: Path, tell: Callable[[str], None]) -> Iterator[Path]:
+    def damaged(store: Path, folder: Path, tell: Callable[[str], None], grid: object) -> Iterator[Path]:
         tell("keyframe 5 is left out: damaged")
         yield folder / "map.json"
 

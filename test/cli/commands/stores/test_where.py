@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from objreg_tools.cli.commands.where import command
 from registration.samples import box, keyframe, moved
 
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
+from objreg_tools.cli.commands.stores.where import command
 
 
 @pytest.fixture
