@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from array import array
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice, product
 from math import prod
@@ -95,6 +95,14 @@ class Landmarks:
         """Of the ``most`` landmarks that were seen last those of this session, the oldest first."""
         last = sorted(islice(reversed(self._known), most))
         return tuple(_landmark(n, self._known[n]) for n in last if self._known[n].last.session == session)
+
+    def placed(self, sessions: Collection[int], most: int) -> list[tuple[int, Last, int]]:
+        """Of the ``most`` landmarks that were seen last those whose place is known in one of these sessions.
+
+        Each with its latest sighting and the number of keyframes that show it; the one seen last comes first.
+        """
+        last = ((number, self._known[number]) for number in islice(reversed(self._known), most))
+        return [(number, known.last, len(known.views)) for number, known in last if known.last.session in sessions]
 
     def assign(
         self, sightings: Sequence[Sighting], links: Sequence[Link] = ()

@@ -13,6 +13,7 @@ from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.closure import Decision, WaitingClosure, redundant, rejected, waiting_of
 from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.localisation.localisation import Localisation
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
@@ -40,6 +41,7 @@ class CameraTrack:
         self._params = params
         self.keyframer = Keyframer(params, numbers)
         self.relocalisation = Relocalisation()
+        self.localisation = Localisation(params, self.relocalisation)
         self.confirmation = Confirmation(params)
         self.thinning = Thinning(params.thin_seconds)
         self.proven = True  # whether enough of the camera was seen to believe it
@@ -132,8 +134,13 @@ class CameraTrack:
         """A constraint that waited, written down."""
         settled, ends = recollection.remember_late(waiting)
         if ends is not None:
-            self.relocalisation.add_closure(settled.closure, *ends)
+            self.add_closure(settled.closure, *ends)
         return settled.closure
+
+    def add_closure(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
+        """Take in a closure of these keyframes, the later one first."""
+        self.localisation.add_closure(closure, source, target)
+        self.relocalisation.add_closure(closure, source, target)
 
 
 class CameraTracks(dict[Camera, CameraTrack]):

@@ -19,6 +19,7 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure, Reason, Rejected, Relocalised
 from objreg_ros.data.frames import Frame
+from objreg_ros.data.localisation import LocalisationState
 from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.memory.landmarks import Landmark
@@ -30,6 +31,8 @@ from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks
 from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, Search
 from objreg_ros.registrar.closure import Decision, observations, rejected
 from objreg_ros.registrar.known_objects import KnownObjects, objects_called
+from objreg_ros.registrar.localisation.localisation import EXPECTED
+from objreg_ros.registrar.localisation.search import accepted_poses, places_without_odometry
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
 from objreg_ros.registrar.params import RegistrarParams
@@ -115,6 +118,12 @@ class Registrar:
         """By what `relocalised` is known, or why it is not."""
         return self._tracks.followed.relocalisation.reason
 
+    @property
+    def localisation(self) -> LocalisationState | None:
+        """How sure it is of where the camera of the newest frame is; None before the first frame."""
+        track = self._tracks.followed
+        return None if track.keyframer.session < 0 else track.localisation.state(track.relocalisation.newest_ns)
+
     def counts(self) -> dict[str, int]:
         """How many keyframes, objects, landmarks, sessions and closures are stored, and how many are forgotten."""
         with self._lock:
@@ -185,10 +194,12 @@ class Registrar:
         keyframe, track = made.numbered(self._store.next_keyframe()), self._tracks.of(made.camera)
         given_up = self._follow(keyframe, clock, track, proven)
         sightings = sightings_of(keyframe)
+        self._expect(keyframe, track)
         candidates = self._recollection.index.query(sightings, track.hidden)
         found = self._register(candidates, keyframe, track, budget) if candidates else self._none_alike(keyframe)
         believed = found.accepted if track.proven else []
         closures, named = self._remember(keyframe, sightings, believed, found, track)
+        self._localise(keyframe, named, track, budget, tied=bool(closures))
         outcome = Outcome(
             closures=closures,
             rejected=(*given_up, *found.refused),
@@ -213,9 +224,32 @@ class Registrar:
 
         Both in one pass: no more pairs are registered once enough are accepted.
         """
+        return Search(keyframe, track.thinning, budget, self._means(track), self.params).run(candidates)
+
+    def _means(self, track: CameraTrack) -> Means:
         gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
-        means = Means(self._store, self._method, gate, track.confirmation, pool, self._recollection.vetoes)
-        return Search(keyframe, track.thinning, budget, means, self.params).run(candidates)
+        return Means(self._store, self._method, gate, track.confirmation, pool, self._recollection.vetoes)
+
+    def _expect(self, keyframe: Keyframe, track: CameraTrack) -> None:
+        """Compare what was known before it with a keyframe of the camera that is followed."""
+        if track is self._tracks.followed:
+            known = self._recollection.landmarks.placed(track.localisation.sessions(), EXPECTED)
+            track.localisation.expect(keyframe, known)
+
+    def _localise(
+        self, keyframe: Keyframe, named: Sequence[Sighting], track: CameraTrack, budget: Budget, tied: bool
+    ) -> None:
+        """Where it is doubtful, search the keyframe's session without odometry; that gives no constraints."""
+        here = track.localisation
+        if track is not self._tracks.followed or not keyframe.by_odometry:
+            return
+        here.see(named, tied)
+        if not here.is_doubtful or tied:
+            return
+        index = self._recollection.index
+        places = places_without_odometry(index, named, track.hidden, here.since_ns)
+        for target, T, odds in accepted_poses(keyframe, places, self._means(track), self.params, budget):
+            here.add_rival(keyframe, target, T, odds)
 
     def _none_alike(self, keyframe: Keyframe) -> Found:
         detail = f"none of {len(self._recollection.index)} stored objects is alike and may be here"
@@ -237,7 +271,7 @@ class Registrar:
                 track.thinning.withdraw(decision.target.session, decision.target.stamp_ns, keyframe.stamp_ns)
             raise
         for decision, closure in zip(believed, closures, strict=True):
-            track.relocalisation.add_closure(closure, keyframe, decision.target)
+            track.add_closure(closure, keyframe, decision.target)
         if not track.proven:
             track.wait_for_proof(found.accepted, keyframe, named)
         for decision in found.waiting:

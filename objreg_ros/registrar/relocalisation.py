@@ -107,6 +107,11 @@ class Relocalisation:
         self._path_until_tie = 0.0
         self._agreeing, self._target_ns, self._by_odometry = 0, 0, False
 
+    @property
+    def newest_ns(self) -> int:
+        """The stamp of the newest frame, 0 before the first."""
+        return self._last_ns
+
     def note_frame(self, frame: Frame, session: int) -> None:
         """Go on to a frame of this session."""
         with self._lock:
@@ -177,6 +182,18 @@ class Relocalisation:
         T_map_here, self._covariance = fused([one.carried(here, way) for one, way in (*agreeing, (tie, 0.0))])
         self._T_map_odom = rigid(T_map_here @ inverse(here.T_session_camera))
         self._origin, self._path_until_tie = here.T_session_camera[:3, 3], self._path_until(here.stamp_ns)
+
+    def begin_at(self, first_ns: int) -> None:
+        """Forget ties to earlier sessions of keyframes before ``first_ns``: the camera was taken elsewhere by then.
+
+        What is left ties it anew, where that suffices.
+        """
+        with self._lock:
+            kept = [one for one in self._ties if one.statement.source.stamp_ns >= first_ns]
+            self._ties, self._map = [], None
+            for tie in kept:
+                self._weigh(tie)
+                self._ties = [*self._ties, tie]
 
     @property
     def relocalised(self) -> Relocalised | None:

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Follows one camera: is it where odometry says, or elsewhere?
+
+For every keyframe it compares the known objects with the view, and for every closure the pose with the tie of its
+session. Closures that contradict odometry and agree with each other say where the camera is instead.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from objreg_ros.data.closures import LoopClosure, Relocalised
+from objreg_ros.data.localisation import LocalisationState
+from objreg_ros.memory.known import Last
+from objreg_ros.memory.sighting import Sighting
+from objreg_ros.registrar.consistency import Standpoint, Statement
+from objreg_ros.registrar.localisation.belief import Belief
+from objreg_ros.registrar.localisation.contradiction import Says, Tied, difference, in_agreement, says
+from objreg_ros.registrar.localisation.expectation import Look, Place, looks_of
+from objreg_ros.registrar.localisation.memory import Familiar
+from objreg_ros.registrar.localisation.places import places_of, shown_by, sigma_of
+from objreg_ros.registrar.localisation.verdict import Standing, reason_of, state_of
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.relocalisation import ALONE_ODDS, Relocalisation, drift
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.labels import LabelGroups
+
+# How often a known object is so in a place that the view shows, of a camera that is there and of one that is elsewhere:
+# `benchmarks/localisation.py` counts both.
+LOOKS = {Look.SEEN: (0.6, 0.05), Look.MISSING: (0.03, 0.35)}
+CONTRADICTS = 0.5  # of right closures of a camera that is elsewhere, so many contradict odometry by enough
+DOUBTFUL_ODDS = 0.01  # of being elsewhere, from which the session is searched without odometry
+EXPECTED = 1000  # landmarks, the newest, that are expected
+SHOWN_NS = 3_000_000_000  # for so long it is said that the camera was kidnapped, if no closure agrees before
+
+
+class Localisation:
+    """What is known of the camera whose ``relocalisation`` this is. For several threads."""
+
+    def __init__(self, params: RegistrarParams, relocalisation: Relocalisation) -> None:
+        self._params, self._relocalisation = params, relocalisation
+        self._groups, self._lock = LabelGroups(params.label_groups), threading.RLock()
+        self._begin(-1, 0)
+
+    def _begin(self, session: int, stamp_ns: int) -> None:
+        self._session, self._belief, self._familiar = session, Belief(stamp_ns), Familiar()
+        self._missing: set[int] = set()  # landmarks
+        self._rivals: list[Statement] = []  # that contradict odometry, since one that agrees
+        self._before: Relocalised | None = None  # the tie before them
+        self._closure: LoopClosure | None = None
+        self._target_travelled = math.nan
+        self._linked = True  # the newest keyframe, to what counts
+        self._since_ns, self._moved_ns, self._kidnapped = stamp_ns, stamp_ns, ""
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether it is worth a search that does not believe odometry."""
+        return self._belief.odds >= DOUBTFUL_ODDS
+
+    @property
+    def since_ns(self) -> int:
+        """Keyframes of the session before this are in odometry that has been found wrong since."""
+        return self._since_ns
+
+    def sessions(self) -> frozenset[int]:
+        """Those whose objects are expected: the camera's own, and that of the map."""
+        tied = self._tied()
+        return frozenset({self._session} if tied is None else {self._session, tied.session})
+
+    def expect(self, keyframe: Keyframe, known: Iterable[tuple[int, Last, int]]) -> list[tuple[Place, Look]]:
+        """Compare known objects, as they were before it, with a keyframe; what it showed of each."""
+        with self._lock:
+            if keyframe.session != self._session:
+                self._begin(keyframe.session, keyframe.stamp_ns)
+                return []
+            self._belief.wait(keyframe.stamp_ns)
+            if not keyframe.by_odometry or keyframe.T_odom_camera is None:
+                return []
+            places = places_of(known, keyframe, self._tied(), self._since_ns, self._params)
+            looks = looks_of(places, shown_by(keyframe, self._groups), keyframe.view)
+            found = list(zip(places, looks, strict=True))
+            confirmed = [self._weigh(place, look, keyframe.stamp_ns) for place, look in found]
+            self._linked = any(confirmed)
+            return found
+
+    def _weigh(self, place: Place, look: Look, stamp_ns: int) -> bool:
+        """Weigh what is shown of an object; whether it says that the camera is where odometry says."""
+        if look is Look.SEEN and self._familiar.counts(place.landmark, stamp_ns):
+            self._missing.discard(place.landmark)
+            self._belief.weigh(ratio(look))
+            return True
+        if look is Look.MISSING and place.landmark not in self._missing:  # it is missed but once
+            self._missing.add(place.landmark)
+            self._belief.weigh(ratio(look))
+        return False
+
+    def see(self, named: Sequence[Sighting], tied: bool) -> None:
+        """Take in the objects of the keyframe under their landmarks; ``tied`` where a closure agreed."""
+        with self._lock:
+            if named and named[0].session == self._session:
+                first = named[0].stamp_ns <= self._since_ns
+                landmarks = (one.landmark for one in named)
+                self._familiar.see(landmarks, named[0].stamp_ns, self._linked or tied or first)
+
+    def add_closure(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
+        """Take in a closure, the later keyframe first, before the relocalisation does."""
+        odds = closure.evidence.get("odds", 1.0)
+        one = Statement(Standpoint.of(source), Standpoint.of(target), closure.T_from_to, odds, True)
+        self._state(one, source, target, closure)
+
+    def add_rival(self, source: Keyframe, target: Keyframe, T_target_source: object, odds: float) -> None:
+        """Take in a pose that was found without odometry, in the camera's own session."""
+        one = Statement(Standpoint.of(source), Standpoint.of(target), np.asarray(T_target_source), odds, True)
+        self._state(one, source, target, None)
+
+    def _state(self, one: Statement, source: Keyframe, target: Keyframe, closure: LoopClosure | None) -> None:
+        with self._lock:
+            if source.session != self._session or source.stamp_ns < self._moved_ns:
+                return
+            tied = self._tied_to(source, target)
+            if tied is None:
+                if target.session != source.session and self._tied() is None:  # the first: nothing to compare it with
+                    self._closure, self._target_travelled = closure, target.travelled
+                return
+            apart = difference(one, tied)
+            match says(apart, tied):
+                case Says.HERE:
+                    self._agrees(one, closure)
+                case Says.ELSEWHERE:
+                    self._contradicts(one)
+                case Says.BESIDE:
+                    pass
+
+    def _agrees(self, one: Statement, closure: LoopClosure | None) -> None:
+        """A closure that says nothing else than odometry does."""
+        self._closure, self._target_travelled = closure or self._closure, one.target.travelled
+        self._belief.weigh(-math.log(min(max(one.odds, 1.0), ALONE_ODDS)))
+        self._rivals, self._before, self._kidnapped = [], None, ""
+
+    def _contradicts(self, one: Statement) -> None:
+        """A closure that puts the camera elsewhere; two of them that agree have it taken there."""
+        self._before = self._before or self._relocalisation.relocalised
+        self._rivals.append(one)
+        self._belief.weigh(math.log(max(CONTRADICTS * min(one.odds, ALONE_ODDS), 1.0)))
+        same = in_agreement(self._rivals)
+        if same and self._belief.odds >= 1.0:
+            self._move(same)
+
+    def _move(self, same: Sequence[Statement]) -> None:
+        """Go on from where the closures ``same`` have the camera."""
+        newest, tied = same[-1], self._tied_to_session(same[-1])
+        metres = difference(newest, tied).metres if tied is not None else math.nan
+        ids = f"{len(same)} closures that agree put the camera {metres:.2f} m from where odometry has it"
+        self._kidnapped = f"{ids}, with odds of {', '.join(f'{one.odds:.0f}' for one in same)}"
+        first_ns = min(one.source.stamp_ns for one in same)
+        self._since_ns, self._moved_ns = first_ns, newest.source.stamp_ns
+        self._relocalisation.begin_at(first_ns)
+        self._rivals, self._before, self._missing, self._familiar = [], None, set(), Familiar()
+        self._target_travelled = newest.target.travelled
+        self._belief.settle(math.prod(max(one.odds, 1.0) for one in same))
+
+    def _tied(self) -> Relocalised | None:
+        """The tie to a map, as it was before closures contradicted it."""
+        return self._before or self._relocalisation.relocalised
+
+    def _tied_to_session(self, one: Statement) -> Tied | None:
+        if one.target.session == one.source.session:
+            return Tied(np.eye(4), 0.0, 0.0)
+        tied = self._tied()
+        return None if tied is None else Tied(tied.T_map_odom, 0.0, 0.0)
+
+    def _tied_to(self, source: Keyframe, target: Keyframe) -> Tied | None:
+        """What is believed of the source in the target's session; None where nothing is."""
+        if source.session == target.session:
+            if not (source.by_odometry and target.by_odometry) or target.stamp_ns < self._since_ns:
+                return None
+            path, turn = abs(source.travelled - target.travelled), abs(source.turned - target.turned)
+            p = self._params
+            return Tied(
+                np.eye(4),
+                p.odometry_translation_noise + p.odometry_drift * path,
+                p.odometry_rotation_noise + p.odometry_rotation_drift * turn,
+            )
+        tied = self._tied()
+        if tied is None or tied.session != target.session:
+            return None
+        way = 0.0 if math.isnan(self._target_travelled) else abs(target.travelled - self._target_travelled)
+        covariance = tied.covariance + drift(way)
+        sigma_deg = math.degrees(math.sqrt(float(np.trace(covariance[3:, 3:])) / 3.0))
+        return Tied(tied.T_map_odom, math.sqrt(float(np.trace(covariance[:3, :3])) / 3.0), sigma_deg)
+
+    def state(self, stamp_ns: int) -> LocalisationState:
+        """The state at the newest frame."""
+        with self._lock:
+            self._belief.wait(stamp_ns)
+            if stamp_ns - self._moved_ns > SHOWN_NS:
+                self._kidnapped = ""
+            tied = self._relocalisation.relocalised
+            now = Standing(
+                elsewhere=self._belief.probability,
+                sigma_m=math.nan if tied is None else sigma_of(tied),
+                age_s=math.nan if self._closure is None else 1e-9 * max(stamp_ns - self._closure.to_ns, 0),
+                missing=len(self._missing),
+                contradicting=len(self._rivals),
+                kidnapped=self._kidnapped,
+            )
+            return LocalisationState(
+                stamp_ns=stamp_ns,
+                state=state_of(now),
+                reason=reason_of(now),
+                age_s=now.age_s,
+                odds=1.0 / self._belief.odds,
+                probability=now.probability,
+                sigma_m=now.sigma_m,
+                closure=self._closure,
+            )
+
+
+def ratio(look: Look) -> float:
+    """The log of how much likelier a look is of a camera that is elsewhere."""
+    here, elsewhere = LOOKS[look]
+    return math.log(elsewhere / here)

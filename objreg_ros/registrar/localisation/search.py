@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search of a camera's own session that does not believe odometry: what a doubtful camera may have been taken to.
+
+What it finds is no constraint: it says only whether odometry is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from objreg_ros.data.checked import Array
+from objreg_ros.memory.retrieval import CandidateKeyframe, Index
+from objreg_ros.memory.sighting import Sighting
+from objreg_ros.memory.store import StoreError
+from objreg_ros.registrar.candidate_search import Budget, Means
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registration import align
+from objreg_ros.registration.gate.likelihood import odds_of
+from objreg_ros.registration.keyframe import Keyframe
+
+TRIES = 2  # stored keyframes of each new one
+
+
+def places_without_odometry(
+    index: Index, sightings: Sequence[Sighting], hidden: frozenset[int], since_ns: int
+) -> list[CandidateKeyframe]:
+    """Keyframes of the session since ``since_ns`` that may show the objects, wherever odometry has them."""
+    session = sightings[0].session
+    asked = [replace(one, by_odometry=False) for one in sightings]
+    found = [one for one in index.query(asked, hidden) if one.session == session and one.stamp_ns >= since_ns]
+    return found[:TRIES]
+
+
+def accepted_poses(
+    keyframe: Keyframe, places: Sequence[CandidateKeyframe], means: Means, params: RegistrarParams, budget: Budget
+) -> Iterator[tuple[Keyframe, Array, float]]:
+    """The keyframes with which it is registered, where the gate accepts that: with ``T_target_source`` and odds."""
+    trying = []
+    for place in places:
+        if budget.over():
+            break
+        try:
+            target = means.store.keyframe(place.keyframe_id)
+        except StoreError:  # what is damaged is reported where it is used
+            continue
+        means.method.prepare(keyframe)
+        trying.append((target, means.pool.submit(align, keyframe, target, None, params, means.method, means.gate)))
+    for target, asked in trying:
+        found = asked.result()
+        if found.accepted and found.candidate is not None:
+            yield target, found.T_target_source, odds_of(found.candidate)
