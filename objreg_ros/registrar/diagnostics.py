@@ -32,6 +32,9 @@ class RegistrarDiagnostics(Diagnostics):
     without_odometry: int = reading(
         "frames without odometry", "Frames that came, or are used, without odometry.", "frames"
     )
+    localisation: str = reading(
+        "localisation", "The state of [`localisation_state`](wire.md#localisation), and why; empty before a frame."
+    )
     robots: Mapping[tuple[str, str], int] = family(
         "<robot>: keyframes <fate>",
         "With `robots`: the keyframes of each that were `received`, `searched` or `stored unsearched`.",

@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from objreg_ros.bridge.messages import known_objects_msg
+from objreg_ros.bridge.messages.localisation_msg import summary_of
 from objreg_ros.bridge.messages.markers import MarkerScene
 from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.params import ManagedParams
@@ -23,7 +24,7 @@ from objreg_ros.bridge.node.robots import prefixes_of
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.node.worker import Backlog, Limit
 from objreg_ros.bridge.process.intra_process import IntraProcessBus
-from objreg_ros.bridge.streams.announcements import Announcements
+from objreg_ros.bridge.streams.announcements import Announcements, LocalisationAnnouncements
 from objreg_ros.bridge.streams.exchanging import Delivered, Exchanging
 from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import read_key
@@ -100,6 +101,7 @@ class RegistrarNode(FramesNode):
         self._announcements = Announcements(self)
         self._announcements.retractions(self._registrar.vetoed)  # what was withdrawn while no node held the store
         self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
+        self._localisation = LocalisationAnnouncements(self, lambda: self._registrar.localisation)
         self.serve_aside("~/reset", self._forget)
         self.serve_aside("~/save", self._settle_and_save)
         self.serve_vetoes(self._veto)
@@ -159,6 +161,7 @@ class RegistrarNode(FramesNode):
                 self.searcher.put(Job(stamp_ns, window, time.monotonic()))
         self._whereabouts.mounted(T_body_camera)
         self._whereabouts.look()
+        self._localisation.passed(stamp_ns, frame.frame_id)
         return window is None
 
     def _take(self, seen: FromRobot | Delivered) -> None:
@@ -209,6 +212,7 @@ class RegistrarNode(FramesNode):
             self._announcements.refusals(outcome.rejected)
             self._count()
             self._whereabouts.look()
+            self._localisation.look()
             if outcome.keyframe_ns is not None:
                 seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
                 self._announcements.landmarks(*seen, self.names_of(outcome.robot), outcome.session, outcome.robot)
@@ -243,6 +247,7 @@ class RegistrarNode(FramesNode):
             waiting_keyframes=len(self.searcher),
             waiting_poses=self._registrar.waiting,
             without_odometry=self.without_odometry,
+            localisation=summary_of(self._localisation.now),
             robots=self._keyframes.counts if self._robots else {},
             exchange=self._exchange.counters if self._robot else {},
             **self._announcements.counts(),

@@ -6,8 +6,9 @@ Those of common_interfaces are always there, those of objreg_msgs where that is 
 
 from __future__ import annotations
 
+import threading
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,10 +18,14 @@ from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from objreg_ros.bridge.messages import closures_msg, to_msg
+from objreg_ros.bridge.messages import closures_msg, localisation_msg, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.node.diagnostics import acceptances, refusals
 from objreg_ros.data.closures import LoopClosure, Observation, Rejected
+from objreg_ros.data.localisation import LocalisationState, State
+
+
+EVERY_NS = 1_000_000_000  # between two states that are alike, by the stamps of frames
 
 
 class Announcements:
@@ -114,3 +119,33 @@ class _Whole:
         self.closures = node.create_publisher(closures_msg.LoopClosureMsg, "loop_closures", kept)
         self.refusals = node.create_publisher(closures_msg.Refusal, "closure_refusals", qos.stage(qos.SINGLE_REFUSALS))
         self.landmarks = node.create_publisher(closures_msg.ObjectLandmarks, "object_landmarks", qos.stage(depth=100))
+
+
+class LocalisationAnnouncements:
+    """Publishes `localisation_state` for ``node``; ``ask`` gives the state, None before the first frame."""
+
+    def __init__(self, node: Node, ask: Callable[[], LocalisationState | None]) -> None:
+        self._ask, self._lock, self._robot = ask, threading.Lock(), node.get_namespace().strip("/")
+        self._frame_id, self._asked_ns = "", -1
+        self._published: State | None = None
+        self.now: LocalisationState | None = None
+        kind = localisation_msg.LocalisationStateMsg
+        self._publisher = None if kind is None else node.create_publisher(kind, "localisation_state", qos.latched())
+
+    def passed(self, stamp_ns: int, frame_id: str) -> None:
+        """After a frame: look once a second."""
+        self._frame_id = frame_id
+        if not 0 <= stamp_ns - self._asked_ns < EVERY_NS:
+            self.look(stamp_ns)
+
+    def look(self, stamp_ns: int | None = None) -> None:
+        """Publish where the state has changed; without a change only where ``stamp_ns`` is given. For two threads."""
+        with self._lock:
+            self.now = now = self._ask()
+            if stamp_ns is not None:
+                self._asked_ns = stamp_ns
+            if now is None or (stamp_ns is None and now.state == self._published):
+                return
+            self._published = now.state
+            if self._publisher is not None:
+                self._publisher.publish(localisation_msg.localisation_state(now, self._frame_id, self._robot))
