@@ -24,7 +24,6 @@ from objreg_ros.bridge.node.diagnostics import acceptances, refusals
 from objreg_ros.data.closures import LoopClosure, Observation, Rejected
 from objreg_ros.data.localisation import LocalisationState, State
 
-
 EVERY_NS = 1_000_000_000  # between two states that are alike, by the stamps of frames
 
 

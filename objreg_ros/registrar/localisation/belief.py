@@ -10,14 +10,16 @@ from __future__ import annotations
 import math
 
 RATE_HZ = 1.0 / 3600.0  # a camera that runs is taken elsewhere, or its odometry fails, once an hour
+WAITED = 0.02  # probability of that with nothing seen, however long: some minute's worth
 MOST = math.log(1e6)  # the log odds are kept within: no evidence is free of common causes
 
 
 class Belief:
-    """The probability of being elsewhere, at a stamp."""
+    """The probability of being elsewhere, at the stamp that it was asked to wait for last."""
 
-    def __init__(self, stamp_ns: int) -> None:
-        self._stamp_ns, self._log_odds = stamp_ns, -MOST
+    def __init__(self) -> None:
+        self._stamp_ns: int | None = None
+        self._log_odds = -MOST
 
     @property
     def odds(self) -> float:
@@ -30,12 +32,13 @@ class Belief:
         return self.odds / (1.0 + self.odds)
 
     def wait(self, stamp_ns: int) -> None:
-        """Go on to a later stamp; an earlier one is passed over."""
-        if stamp_ns <= self._stamp_ns:
+        """Go on to a later stamp; an earlier one is passed over. Waiting alone makes it no likelier than `WAITED`."""
+        before_ns, self._stamp_ns = self._stamp_ns, max(stamp_ns, self._stamp_ns or stamp_ns)
+        if before_ns is None or stamp_ns <= before_ns or self.probability >= WAITED:
             return
-        stays = math.exp(-RATE_HZ * 1e-9 * (stamp_ns - self._stamp_ns))
-        self._stamp_ns, here = stamp_ns, (1.0 - self.probability) * stays
-        self._set(math.log((1.0 - here) / here))
+        stays = math.exp(-RATE_HZ * 1e-9 * (stamp_ns - before_ns))
+        elsewhere = min(1.0 - (1.0 - self.probability) * stays, WAITED)
+        self._set(math.log(elsewhere / (1.0 - elsewhere)))
 
     def weigh(self, log_ratio: float) -> None:
         """Take in evidence: the log of how much likelier it is of a camera elsewhere than of one that is here."""

@@ -47,7 +47,7 @@ class Localisation:
         self._begin(-1, 0)
 
     def _begin(self, session: int, stamp_ns: int) -> None:
-        self._session, self._belief, self._familiar = session, Belief(stamp_ns), Familiar()
+        self._session, self._belief, self._familiar = session, Belief(), Familiar()
         self._missing: set[int] = set()  # landmarks
         self._rivals: list[Statement] = []  # that contradict odometry, since one that agrees
         self._before: Relocalised | None = None  # the tie before them
@@ -59,7 +59,7 @@ class Localisation:
     @property
     def is_doubtful(self) -> bool:
         """Whether it is worth a search that does not believe odometry."""
-        return self._belief.odds >= DOUBTFUL_ODDS
+        return self._belief.odds >= DOUBTFUL_ODDS and bool(self._missing or self._rivals)
 
     @property
     def since_ns(self) -> int:
@@ -76,6 +76,7 @@ class Localisation:
         with self._lock:
             if keyframe.session != self._session:
                 self._begin(keyframe.session, keyframe.stamp_ns)
+                self._belief.wait(keyframe.stamp_ns)
                 return []
             self._belief.wait(keyframe.stamp_ns)
             if not keyframe.by_odometry or keyframe.T_odom_camera is None:

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A later session that goes along x beside an earlier one's map, and is taken elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from registration.samples import SECOND, box, frame, keyframe, moved
+
+from objreg_ros.data.closures import LoopClosure
+from objreg_ros.data.localisation import LocalisationState, State
+from objreg_ros.geometry import inverse
+from objreg_ros.memory.known import Last, last_of
+from objreg_ros.memory.sighting import sightings_of
+from objreg_ros.registrar.localisation.expectation import Look
+from objreg_ros.registrar.localisation.localisation import SHOWN_NS, Localisation
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.relocalisation import Relocalisation
+from objreg_ros.registration.keyframe import Keyframe, KeyObject
+
+EARLIER, NOW = 3, 5
+TIGHT = np.diag([0.01**2] * 3 + [0.005**2] * 3)
+TAKEN = moved(0.0, 0.0, 4.0)  # T_map_odom after it was
+
+
+class Walk:
+    """The camera, a keyframe every 20 cm and second."""
+
+    def __init__(self) -> None:
+        self.relocalisation = Relocalisation()
+        self.here = Localisation(RegistrarParams(), self.relocalisation)
+        self.step = 0
+
+    def go(self, known: list[tuple[int, Last, int]] | None = None, *objects: str) -> Keyframe:
+        """On to the next keyframe, which shows objects a metre ahead."""
+        self.step += 1
+        seconds, metres = 100.0 + self.step, 0.2 * self.step
+        self.relocalisation.note_frame(frame(seconds, T_odom_camera=moved(metres)), NOW)
+        shown = tuple(KeyObject(cloud=box(label, (0.3 * k, 0.0, 1.0))) for k, label in enumerate(objects))
+        made = replace(keyframe(self.step, seconds, (), NOW), objects=shown)
+        made = replace(made, T_odom_camera=moved(metres), travelled=metres, by_odometry=True)
+        self.here.expect(made, known or [])
+        return made
+
+    def close(self, source: Keyframe, taken: np.ndarray, odds: float = 200.0) -> None:
+        """A closure to the keyframe of the earlier session that is beside where the camera is."""
+        T_map_source = taken @ moved(source.travelled)
+        target = replace(keyframe(900 + self.step, 0.2 * self.step, (), EARLIER), by_odometry=True)
+        target = replace(target, T_odom_camera=T_map_source @ moved(0.1), travelled=source.travelled)
+        closure = LoopClosure(
+            from_ns=target.stamp_ns,
+            to_ns=source.stamp_ns,
+            T_from_to=inverse(moved(0.1)),
+            covariance=TIGHT,
+            labels=(),
+            evidence={"odds": odds},
+            from_session=EARLIER,
+            to_session=NOW,
+        )
+        self.here.add_closure(closure, source, target)
+        self.relocalisation.add_closure(closure, source, target)
+
+    @property
+    def now(self) -> LocalisationState:
+        return self.here.state(self.relocalisation.newest_ns)
+
+
+def known(*landmarks: int, session: int = NOW, ahead: float = 0.0) -> list[tuple[int, Last, int]]:
+    """Cups that stand a metre ahead of the walk's beginning, 20 cm apart, and before a wall."""
+    seen = replace(
+        keyframe(1, 101.0, (), session),
+        objects=tuple(KeyObject(cloud=box("cup", (ahead + 0.2 * k, -0.1, 1.0))) for k in range(len(landmarks))),
+        T_odom_camera=np.eye(4),
+        travelled=0.0,
+        by_odometry=True,
+    )
+    return [(n, last_of(one), 3) for n, one in zip(landmarks, sightings_of(seen), strict=True)]
+
+
+def tied() -> Walk:
+    walk = Walk()
+    for _ in range(3):
+        walk.close(walk.go(), np.eye(4))
+    return walk
+
+
+def test_it_tracks_until_a_map_is_tied_and_then_is_sure() -> None:
+    walk = Walk()
+    walk.close(walk.go(), np.eye(4))
+    assert walk.now.state is State.TRACKING and np.isnan(walk.now.probability)
+    walk.close(walk.go(), np.eye(4))
+    walk.close(walk.go(), np.eye(4))
+    now = walk.now
+    assert now.state is State.SURE and now.probability > 0.95 and now.age_s == 0.0 and now.closure is not None
+
+
+def test_it_is_unsure_once_odometry_has_drifted() -> None:
+    walk = tied()
+    for _ in range(40):  # 8 m
+        walk.go()
+    now = walk.now
+    assert now.state is State.UNSURE and now.sigma_m > 0.2 and now.age_s == 40.0
+
+
+def test_one_closure_that_contradicts_is_doubt_and_two_that_agree_are_a_kidnapping() -> None:
+    walk = tied()
+    walk.close(walk.go(), TAKEN)
+    assert walk.now.state in (State.SURE, State.UNSURE) and walk.now.odds < 100.0
+    walk.close(walk.go(), TAKEN)
+    now = walk.now
+    assert now.state is State.KIDNAPPED and "4.00 m" in now.reason
+    found = walk.relocalisation.relocalised
+    assert found is not None and np.allclose(found.T_map_odom, TAKEN, atol=1e-6)
+    walk.close(walk.go(), TAKEN)
+    assert walk.now.state is State.SURE
+
+
+def test_a_kidnapping_is_said_for_a_while_where_no_closure_follows() -> None:
+    walk = tied()
+    for _ in range(2):
+        walk.close(walk.go(), TAKEN)
+    assert walk.now.state is State.KIDNAPPED
+    while walk.relocalisation.newest_ns <= 105 * SECOND + SHOWN_NS:
+        walk.go()
+    assert walk.now.state is State.SURE
+
+
+def test_two_that_contradict_odometry_and_each_other_are_no_kidnapping() -> None:
+    walk = tied()
+    walk.close(walk.go(), TAKEN)
+    walk.close(walk.go(), moved(0.0, 3.0, 0.0))
+    assert walk.now.state is State.LOST
+
+
+def test_one_that_agrees_again_ends_the_doubt() -> None:
+    walk = tied()
+    walk.close(walk.go(), TAKEN)
+    walk.close(walk.go(), np.eye(4))
+    assert walk.now.state is State.SURE and walk.now.odds > 1000.0
+
+
+def test_one_missing_object_is_not_lost_and_many_are() -> None:
+    walk = Walk()
+    walk.go()
+    walk.go(known(1))
+    assert walk.now.state is State.TRACKING
+    for _ in range(3):  # the same one again adds nothing
+        walk.go(known(1))
+    assert walk.now.state is State.TRACKING
+    other = Walk()
+    other.go()
+    other.go(known(11, 12, 13, 14))
+    assert other.now.state is State.LOST and "4 known objects are missing" in other.now.reason
+
+
+def test_objects_of_another_session_are_expected_only_where_its_map_is_tied() -> None:
+    walk = Walk()
+    walk.go()
+    assert walk.here.expect(walk.go(), known(1, session=EARLIER)) == []
+    ties = tied()
+    (found,) = ties.here.expect(ties.go(), known(1, session=EARLIER, ahead=0.8))
+    assert found[1] is Look.MISSING
+
+
+def test_another_session_begins_anew() -> None:
+    walk = Walk()
+    walk.go()
+    walk.go(known(11, 12, 13, 14))
+    walk.here.expect(replace(walk.go(), session=NOW + 1), [])
+    assert walk.now.state is State.TRACKING
