@@ -125,7 +125,7 @@ class LocalisationAnnouncements:
 
     def __init__(self, node: Node, ask: Callable[[], LocalisationState | None]) -> None:
         self._ask, self._lock, self._robot = ask, threading.Lock(), node.get_namespace().strip("/")
-        self._frame_id, self._asked_ns = "", -1
+        self._frame_id, self._asked_ns = "", -EVERY_NS
         self._published: State | None = None
         self.now: LocalisationState | None = None
         kind = localisation_msg.LocalisationStateMsg

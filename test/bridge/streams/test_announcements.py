@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,10 +15,11 @@ import pytest
 import rclpy
 from rclpy.node import Node
 
-from objreg_ros.bridge.messages import closures_msg
+from objreg_ros.bridge.messages import closures_msg, localisation_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.streams.announcements import Announcements
+from objreg_ros.bridge.streams.announcements import Announcements, LocalisationAnnouncements
 from objreg_ros.data.closures import LoopClosure, Observation, Reason, Rejected
+from objreg_ros.data.localisation import LocalisationState, State
 
 CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",), to_session=1)
 REJECTED = Rejected(reason=Reason.NO_CANDIDATE, from_ns=9, to_ns=9, detail="none of 3")
@@ -82,3 +85,25 @@ def test_with_objreg_msgs_all_that_is_known_is_told_under_the_name_of_the_namesp
     assert closures[0].id == closures_msg.closure_id(CLOSURE, "fleet/robot1")
     assert closures[0].to_moment.robot == refusals[0].to_moment.robot == landmarks[0].robot == "fleet/robot1"
     assert refusals[0].reason == refusals[0].NO_CANDIDATE and landmarks[0].landmarks[0].id == 4
+
+
+def test_the_state_of_the_localisation_goes_out_where_it_changes_and_once_a_second(
+    node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(localisation_msg, "LocalisationStateMsg", None)
+    state = LocalisationState(
+        stamp_ns=0, state=State.TRACKING, reason="", age_s=0.0, odds=1.0, probability=0.5, sigma_m=0.1
+    )
+    asked = [state]
+    telling = LocalisationAnnouncements(node, lambda: asked[-1])
+    sent: list[int] = []
+    monkeypatch.setattr(telling, "_publisher", SimpleNamespace(publish=sent.append))
+    monkeypatch.setattr(localisation_msg, "localisation_state", lambda now, *where: (now.state, *where))
+    for stamp_ns in (0, 400_000_000, 999_999_999, 1_000_000_000, 1_500_000_000):
+        telling.passed(stamp_ns, "eye")
+    assert sent == 2 * [(State.TRACKING, "eye", "fleet/robot1")]
+    telling.look()
+    assert len(sent) == 2
+    asked.append(replace(state, state=State.LOST))
+    telling.look()
+    assert sent[-1] == (State.LOST, "eye", "fleet/robot1") and telling.now == asked[-1]
