@@ -14,7 +14,6 @@ from std_srvs.srv import Trigger
 from objreg_ros.bridge.messages import localisation_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.data.localisation import State
-from objreg_ros.geometry import inverse
 
 from .graph import Graph
 from .test_relocalised import BESIDE, HERE, MOUNT, T_ODOM_MAP, ask, frame, remember, tell
@@ -48,11 +47,10 @@ def test_a_robot_that_is_carried_elsewhere_is_kidnapped_once_closures_agree(fres
     if localisation_msg.LocalisationStateMsg is not None:
         fresh.receive(localisation_msg.LocalisationStateMsg, "localisation_state", qos.latched())
     fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
-    there = HERE @ inverse(BESIDE)  # what odometry misses: it believes to be where it was, and stands beside
-    T_far = T_ODOM_MAP.copy()
-    T_far[:3, 3] += 3.0
+    T_carried = T_ODOM_MAP.copy()  # where odometry's frame is in the map once it has missed two metres
+    T_carried[0, 3] += 2.0
     steps = [(100, T_ODOM_MAP @ BESIDE, BESIDE), (103, T_ODOM_MAP @ HERE, HERE)]
-    steps += [(106, T_far @ there @ BESIDE, BESIDE), (109, T_far @ there @ HERE, HERE), (112, T_far @ BESIDE, BESIDE)]
+    steps += [(106, T_carried @ BESIDE, BESIDE), (109, T_carried @ HERE, HERE)]
     frames = [frame(*step) for step in steps]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for k, one in enumerate(frames):

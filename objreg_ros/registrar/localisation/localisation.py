@@ -35,7 +35,7 @@ LOOKS = {Look.SEEN: (0.6, 0.05), Look.MISSING: (0.03, 0.35)}
 CONTRADICTS = 0.5  # of right closures of a camera that is elsewhere, so many contradict odometry by enough
 DOUBTFUL_ODDS = 0.01  # of being elsewhere, from which the session is searched without odometry
 EXPECTED = 1000  # landmarks, the newest, that are expected
-SHOWN_NS = 3_000_000_000  # for so long it is said that the camera was kidnapped, if no closure agrees before
+SHOWN_NS = 3_000_000_000  # for so long it is said that the camera was kidnapped: who looks once a second must see it
 
 
 class Localisation:
@@ -140,7 +140,7 @@ class Localisation:
         """A closure that says nothing else than odometry does."""
         self._closure, self._target_travelled = closure or self._closure, one.target.travelled
         self._belief.weigh(-math.log(min(max(one.odds, 1.0), ALONE_ODDS)))
-        self._rivals, self._before, self._kidnapped = [], None, ""
+        self._rivals, self._before = [], None
 
     def _contradicts(self, one: Statement) -> None:
         """A closure that puts the camera elsewhere; two of them that agree have it taken there."""
