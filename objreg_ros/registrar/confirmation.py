@@ -46,6 +46,12 @@ class Confirmation:
         self._limits, self._wait_ns = limits_of(params), round(1e9 * params.confirm_seconds)
         self._consistency = Consistency()
         self._waiting: dict[int, WaitingClosure] = {}
+        self._contrary: list[tuple[Keyframe, Candidate]] = []  # refused for odometry alone, of the newest keyframe
+
+    def take_contrary(self) -> list[tuple[Keyframe, Candidate]]:
+        """The stored keyframes, and poses in them, that only odometry speaks against; since the last call."""
+        taken, self._contrary = self._contrary, []
+        return taken
 
     def __len__(self) -> int:
         """How many wait."""
@@ -59,6 +65,8 @@ class Confirmation:
         ``prior`` is what odometry expected of it. ValueError where a gate gave no reason.
         """
         candidate, accepted = registration.candidate, registration.accepted
+        if candidate is not None and registration.reason is Reason.ODOMETRY:
+            self._contrary.append((target, candidate))
         if candidate is None or not (accepted or (self._wait_ns and self._possible(candidate, prior))):
             return _refused(source, target, registration)
         decision = Decision(target=target, candidate=candidate)

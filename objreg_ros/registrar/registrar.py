@@ -39,6 +39,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
+from objreg_ros.registration.gate.likelihood import odds_of
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.terminal import progress
 
@@ -239,11 +240,17 @@ class Registrar:
     def _localise(
         self, keyframe: Keyframe, named: Sequence[Sighting], track: CameraTrack, budget: Budget, tied: bool
     ) -> None:
-        """Where it is doubtful, search the keyframe's session without odometry; that gives no constraints."""
-        here = track.localisation
+        """Weigh what only odometry speaks against, and search the session without it where it is doubtful.
+
+        Neither gives constraints.
+        """
+        here, contrary = track.localisation, track.confirmation.take_contrary()
         if track is not self._tracks.followed or not keyframe.by_odometry:
             return
         here.see(named, tied)
+        for target, candidate in contrary:
+            if (odds := odds_of(candidate)) >= self.params.least_odds:
+                here.add_rival(keyframe, target, candidate.T_target_source, odds)
         if not here.is_doubtful or tied:
             return
         index = self._recollection.index

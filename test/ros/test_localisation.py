@@ -50,7 +50,7 @@ def test_a_robot_that_is_carried_elsewhere_is_kidnapped_once_closures_agree(fres
     T_carried = T_ODOM_MAP.copy()  # where odometry's frame is in the map once it has missed two metres
     T_carried[0, 3] += 2.0
     steps = [(100, T_ODOM_MAP @ BESIDE, BESIDE), (103, T_ODOM_MAP @ HERE, HERE)]
-    steps += [(106, T_carried @ BESIDE, BESIDE), (109, T_carried @ HERE, HERE)]
+    steps += [(106, T_carried @ BESIDE, BESIDE), (109, T_carried @ HERE, HERE), (112, T_carried @ BESIDE, BESIDE)]
     frames = [frame(*step) for step in steps]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for k, one in enumerate(frames):

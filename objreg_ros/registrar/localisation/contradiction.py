@@ -21,7 +21,7 @@ class Says(Enum):
     """What a closure says of where odometry has the camera."""
 
     HERE = "here"
-    BESIDE = "beside"  # odometry has drifted more than is expected, and not to another place
+    BESIDE = "beside"  # neither: odometry has drifted more than is expected, or so much is, that it would be elsewhere
     ELSEWHERE = "elsewhere"
 
 
@@ -55,7 +55,7 @@ def difference(one: Statement, tied: Tied) -> Difference:
 def says(apart: Difference, tied: Tied) -> Says:
     """What a closure that is so far off says."""
     far_m, far_deg = DEVIATIONS * tied.sigma_m, DEVIATIONS * tied.sigma_deg
-    if apart.metres <= far_m and apart.degrees <= far_deg:
+    if apart.metres <= min(far_m, ELSEWHERE_M) and apart.degrees <= min(far_deg, ELSEWHERE_DEG):
         return Says.HERE
     elsewhere = apart.metres > max(far_m, ELSEWHERE_M) or apart.degrees > max(far_deg, ELSEWHERE_DEG)
     return Says.ELSEWHERE if elsewhere else Says.BESIDE

@@ -41,7 +41,7 @@ def test_the_tie_of_a_right_closure_is_what_is_believed() -> None:
 def test_another_place_is_more_than_drift_and_more_than_half_a_metre_away() -> None:
     apart = difference(statement(1.0, moved(0.0, 0.8)), TIED)
     assert apart.metres == pytest.approx(0.8) and says(apart, TIED) is Says.ELSEWHERE
-    assert says(apart, TIED._replace(sigma_m=0.3)) is Says.HERE
+    assert says(apart, TIED._replace(sigma_m=0.3)) is Says.BESIDE
     assert says(Difference(0.0, 0.3), TIED) is Says.BESIDE
 
 
