@@ -145,8 +145,9 @@ class Localisation:
     def _contradicts(self, one: Statement) -> None:
         """A closure that puts the camera elsewhere; two of them that agree have it taken there."""
         self._before = self._before or self._relocalisation.relocalised
+        if one.source.stamp_ns not in {other.source.stamp_ns for other in self._rivals}:  # those of one err together
+            self._belief.weigh(math.log(max(CONTRADICTS * min(one.odds, ALONE_ODDS), 1.0)))
         self._rivals.append(one)
-        self._belief.weigh(math.log(max(CONTRADICTS * min(one.odds, ALONE_ODDS), 1.0)))
         same = in_agreement(self._rivals)
         if same and self._belief.odds >= 1.0:
             self._move(same)
