@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search of a session that does not believe odometry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from registration.samples import box, keyframe, moved
+
+from objreg_ros.memory.retrieval import CandidateKeyframe, Index
+from objreg_ros.memory.sighting import sightings_of
+from objreg_ros.memory.store import StoreError
+from objreg_ros.registrar.candidate_search import Budget
+from objreg_ros.registrar.localisation.search import TRIES, accepted_poses, places_without_odometry
+from objreg_ros.registrar.params import RegistrarParams
+
+PARAMS = RegistrarParams()
+CUP = box("cup", (0.0, 0.0, 1.0))
+ENDLESS = Budget(np.inf, lambda: False)
+
+
+def test_places_that_odometry_has_far_away_are_found_but_none_before_it_was_found_wrong() -> None:
+    index = Index(PARAMS)
+    stored = [replace(keyframe(k, 10.0 * k, (CUP,)), by_odometry=True) for k in (1, 2, 3, 4)]
+    for one in stored:
+        index.add_objects(sightings_of(one))
+    far = replace(keyframe(9, 90.0, (CUP,), 0, moved(50.0)), by_odometry=True, travelled=1.0)
+    assert index.query(sightings_of(far)) == []
+    found = places_without_odometry(index, sightings_of(far), frozenset(), 15_000_000_000)
+    assert len(found) == TRIES and {one.keyframe_id for one in found} <= {2, 3, 4}
+
+
+def test_what_cannot_be_read_or_is_not_begun_in_time_is_left_out() -> None:
+    def unreadable(number: int) -> Any:
+        raise StoreError("damaged")
+
+    means: Any = SimpleNamespace(store=SimpleNamespace(keyframe=unreadable))
+    places = [CandidateKeyframe(1, 0, 0, 1.0)]
+    assert list(accepted_poses(keyframe(), places, means, PARAMS, ENDLESS)) == []
+    assert list(accepted_poses(keyframe(), places, means, PARAMS, Budget(0.0, lambda: True))) == []
