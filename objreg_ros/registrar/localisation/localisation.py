@@ -127,6 +127,8 @@ class Localisation:
                 if target.session != source.session and self._tied() is None:  # the first: nothing to compare it with
                     self._closure, self._target_travelled = closure, target.travelled
                 return
+            if self._rivals and source.session == target.session and target.stamp_ns >= self._rivals[0].source.stamp_ns:
+                return  # if the camera was taken away, both keyframes came after that
             apart = difference(one, tied)
             match says(apart, tied):
                 case Says.HERE:

@@ -168,3 +168,23 @@ def test_another_session_begins_anew() -> None:
     walk.go(known(11, 12, 13, 14))
     walk.here.expect(replace(walk.go(), session=NOW + 1), [])
     assert walk.now.state is State.TRACKING
+
+
+def test_closures_among_keyframes_after_a_kidnapping_do_not_hide_it() -> None:
+    walk = tied()
+    first = walk.go()
+    walk.close(first, TAKEN)
+    second = walk.go()
+    one = LoopClosure(
+        from_ns=first.stamp_ns,
+        to_ns=second.stamp_ns,
+        T_from_to=moved(0.2),
+        covariance=TIGHT,
+        labels=(),
+        evidence={"odds": 900.0},
+        from_session=NOW,
+        to_session=NOW,
+    )
+    walk.here.add_closure(one, second, first)
+    walk.close(second, TAKEN)
+    assert walk.now.state is State.KIDNAPPED
