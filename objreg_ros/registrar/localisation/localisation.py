@@ -29,8 +29,8 @@ from objreg_ros.registrar.relocalisation import ALONE_ODDS, Relocalisation, drif
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
 
-# How often a known object is so in a place that the view shows, of a camera that is there and of one that is elsewhere:
-# `benchmarks/localisation.py` counts both.
+# How often a known object is so in a place that the view shows, of a camera that is there and of one that is elsewhere.
+# Estimates, not measured: `benchmarks/localisation.py` counts looks, but those of places outside the picture too.
 LOOKS = {Look.SEEN: (0.6, 0.05), Look.MISSING: (0.03, 0.35)}
 CONTRADICTS = 0.5  # of right closures of a camera that is elsewhere, so many contradict odometry by enough
 DOUBTFUL_ODDS = 0.01  # of being elsewhere, from which the session is searched without odometry
