@@ -32,14 +32,13 @@ from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, S
 from objreg_ros.registrar.closure import Decision, observations, rejected
 from objreg_ros.registrar.known_objects import KnownObjects, objects_called
 from objreg_ros.registrar.localisation.localisation import EXPECTED
-from objreg_ros.registrar.localisation.search import accepted_poses, places_without_odometry
+from objreg_ros.registrar.localisation.search import search_elsewhere, weigh_contrary
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
-from objreg_ros.registration.gate.likelihood import odds_of
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.terminal import progress
 
@@ -240,23 +239,14 @@ class Registrar:
     def _localise(
         self, keyframe: Keyframe, named: Sequence[Sighting], track: CameraTrack, budget: Budget, tied: bool
     ) -> None:
-        """Weigh what only odometry speaks against, and search the session without it where it is doubtful.
-
-        Neither gives constraints.
-        """
-        here, contrary = track.localisation, track.confirmation.take_contrary()
-        if track is not self._tracks.followed or not keyframe.by_odometry:
-            return
-        here.see(named, tied)
-        for target, candidate in contrary:
-            if (odds := odds_of(candidate)) >= self.params.least_odds:
-                here.add_rival(keyframe, target, candidate.T_target_source, odds)
-        if not here.is_doubtful or tied:
-            return
-        index = self._recollection.index
-        places = places_without_odometry(index, named, track.hidden, here.since_ns)
-        for target, T, odds in accepted_poses(keyframe, places, self._means(track), self.params, budget):
-            here.add_rival(keyframe, target, T, odds)
+        """Look for another place of the camera that is followed; that gives no constraints."""
+        contrary = track.confirmation.take_contrary()
+        if track is self._tracks.followed and keyframe.by_odometry:
+            track.localisation.see(named, tied)
+            weigh_contrary(track.localisation, keyframe, contrary, self.params.least_odds)
+            if not tied:
+                places = self._recollection.index, track.hidden
+                search_elsewhere(track.localisation, keyframe, named, places, self._means(track), self.params, budget)
 
     def _none_alike(self, keyframe: Keyframe) -> Found:
         detail = f"none of {len(self._recollection.index)} stored objects is alike and may be here"

@@ -6,7 +6,7 @@ What it finds is no constraint: it says only whether odometry is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from objreg_ros.data.checked import Array
@@ -14,12 +14,39 @@ from objreg_ros.memory.retrieval import CandidateKeyframe, Index
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar.candidate_search import Budget, Means
+from objreg_ros.registrar.localisation.localisation import Localisation
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration import align
+from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.gate.likelihood import odds_of
 from objreg_ros.registration.keyframe import Keyframe
 
 TRIES = 2  # stored keyframes of each new one
+
+
+def weigh_contrary(
+    here: Localisation, keyframe: Keyframe, contrary: Iterable[tuple[Keyframe, Candidate]], least_odds: float
+) -> None:
+    """Take poses that only odometry speaks against for rivals, where their odds are enough for a constraint."""
+    for target, candidate in contrary:
+        if (odds := odds_of(candidate)) >= least_odds:
+            here.add_rival(keyframe, target, candidate.T_target_source, odds)
+
+
+def search_elsewhere(
+    here: Localisation,
+    keyframe: Keyframe,
+    named: Sequence[Sighting],
+    places: tuple[Index, frozenset[int]],
+    means: Means,
+    params: RegistrarParams,
+    budget: Budget,
+) -> None:
+    """Search the session without odometry where it is doubtful; ``places`` are the index and the hidden sessions."""
+    if here.is_doubtful:
+        found = places_without_odometry(places[0], named, places[1], here.since_ns)
+        for target, T, odds in accepted_poses(keyframe, found, means, params, budget):
+            here.add_rival(keyframe, target, T, odds)
 
 
 def places_without_odometry(
