@@ -45,6 +45,7 @@ SUMMARIES = {
     "merge": "Merge stores of several robots or days into one, tied together.",
     "export": "Write the objects of a store as PLY and JSON, and its map.",
     "where": "Show where objects are on the map of a store.",
+    "export-labels": "Label the pictures of a recording with its objects, to train a detector on.",
     "simulate": "Make a recording with exact ground truth.",
     "fetch-model": "Get a detector model.",
     "report": "Draw pictures and tables of a run.",
