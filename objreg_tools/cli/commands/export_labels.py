@@ -36,7 +36,7 @@ from objreg_tools.report.run.run_summary import RunSummary
               help="The folder of the data set, new or empty.")  # fmt: skip
 @click.option("--names", "names_file", type=InputPath(exists=True, dir_okay=False, path_type=Path),
               help="YAML of names by object, as an earlier export wrote it: 12: mug. '' leaves one out.")  # fmt: skip
-@click.option("--name", "words", multiple=True, metavar="ID=NAME", help="Name one object; before --names.")
+@click.option("--name", "pairs", multiple=True, metavar="ID=NAME", help="Name one object; before --names.")
 @click.option("--named-only", is_flag=True, help="Leave out objects without a name; else their class is thing.")
 @click.option("--every", type=click.IntRange(min=1), default=1, show_default=True, help="One picture of so many.")
 @click.option("--least-share", type=click.FloatRange(0.0, 1.0), default=LEAST_SHARE, show_default=True,
@@ -44,7 +44,7 @@ from objreg_tools.report.run.run_summary import RunSummary
 @click.option("--least-views", type=click.IntRange(min=1), default=LEAST_VIEWS, show_default=True,
               help="How many keyframes saw an object that is labelled.")  # fmt: skip
 @options.of_run
-def command(recording: Path, out: Path, names_file: Path | None, words: tuple[str, ...], **given: Any) -> int:
+def command(recording: Path, out: Path, names_file: Path | None, pairs: tuple[str, ...], **given: Any) -> int:
     """Label the pictures of RECORDING with the objects of a run: a data set to train a detector on.
 
     An object that the registrar knows is labelled in every picture that shows it, whether or not the detector saw it
@@ -55,7 +55,7 @@ def command(recording: Path, out: Path, names_file: Path | None, words: tuple[st
     Blocks of time train and validate. Ends with 3 if no picture shows an object.
     """
     asked = RecordedOptions.of(**{name: given.pop(name) for name in options.OF_RUN})
-    names = read_names(names_file, words)
+    names = read_names(names_file, pairs)
     wanted = LabelOptions(names=names, **given)
     print_ignored(asked.settings)
     if out.is_dir() and any(out.iterdir()):

@@ -15,13 +15,13 @@ from objreg_tools.report.labels.mapped_objects import MappedObject
 EXAMPLE = "12=mug"
 
 
-def read_names(file: Path | None, words: Iterable[str] = ()) -> dict[int, str]:
+def read_names(file: Path | None, pairs: Iterable[str] = ()) -> dict[int, str]:
     """Names by landmark: those of a YAML file, ``12: mug`` a line, then ``12=mug`` of the command line, which hold.
 
     An empty name leaves a landmark out. ValueError for what is no such text, OSError for a file that is not there.
     """
     names = {} if file is None else _of_file(file)
-    for text in words:
+    for text in pairs:
         number, sign, name = text.partition("=")
         if not sign:
             raise ValueError(f"--name: expected a landmark and its name as {EXAMPLE}, got {text!r}")

@@ -38,8 +38,10 @@ def on_a_map(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("objreg_tools.cli.commands.export_labels.run_on_map", known)
 
 
-def export(*words: object) -> Result:
-    return CliRunner().invoke(group, ["export-labels", *map(str, words)], catch_exceptions=False, standalone_mode=False)
+def export(*arguments: object) -> Result:
+    return CliRunner().invoke(
+        group, ["export-labels", *map(str, arguments)], catch_exceptions=False, standalone_mode=False
+    )
 
 
 def test_an_object_is_labelled_where_depth_shows_it(on_a_map: None, tmp_path: Path) -> None:
@@ -48,7 +50,7 @@ def test_an_object_is_labelled_where_depth_shows_it(on_a_map: None, tmp_path: Pa
     assert result.return_value == 0 and "wall: 1 labels" in result.output and "2 show none" in result.output
     assert "this run has no object 9" in result.output
     (file,) = out.glob("labels/*/tum_*.txt")
-    number, *box = (float(word) for word in file.read_text().split())
+    number, *box = (float(number) for number in file.read_text().split())
     assert number == 0 and box == pytest.approx([0.5, 0.5, 20 / 64, 20 / 48], abs=0.03)
     assert (out / "labels.html").is_file() and (out / "names.yaml").is_file()
 

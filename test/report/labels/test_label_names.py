@@ -18,10 +18,10 @@ def test_the_command_line_goes_before_the_file(tmp_path: Path) -> None:
     assert read_names(file, ["12=big mug"]) == {12: "big mug", 3: "", 4: ""}
 
 
-@pytest.mark.parametrize("word", ["mug", "x=mug", "=mug", "1=a\nb", "-1=mug"])
-def test_a_word_that_names_no_landmark_is_refused(word: str) -> None:
+@pytest.mark.parametrize("text", ["mug", "x=mug", "=mug", "1=a\nb", "-1=mug"])
+def test_a_text_that_names_no_landmark_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="--name: expected"):
-        read_names(None, [word])
+        read_names(None, [text])
 
 
 @pytest.mark.parametrize("text", ["- mug\n", "mug\n", "mug: 12\n", "12: [\n", "true: mug\n"])
