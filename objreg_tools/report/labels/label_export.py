@@ -86,8 +86,9 @@ def export_labels(
         file = made.finish()
         counts = {"pictures that train": pictures[TRAIN], "that validate": pictures[VAL], "labels": labels.total(),
                   "classes": len(made.classes)}  # fmt: skip
-        write_whole(folder / PAGE, labels_page(name, seen, classes, crops, counts))
-        write_whole(folder / NAMES, names_text(seen, options.names))
+        shown_once = [one for one in seen if one.landmark in crops]
+        write_whole(folder / PAGE, labels_page(name, shown_once, classes, crops, counts))
+        write_whole(folder / NAMES, names_text(shown_once, options.names))
     return Exported(pictures, labels, unlabelled, file)
 
 

@@ -2,7 +2,7 @@
 """The part of an object that a picture shows: its points projected, and compared with the depth that was measured.
 
 Where the depth is that of the points the object is seen, where it is nearer something is before it, and where it is
-farther the object is not there.
+farther the object is not there. Where none was measured it is seen if nothing is before the rest.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ NEAREST_Z = 0.1  # m
 WIDEST = 8  # px of the gap between two points that is closed
 GAPS = 1.5  # spacings of points: neighbours in a row that is slanted
 UNKNOWN_NEAR = 5  # px from a pixel that is seen: there a lack of depth hides nothing
+FREE = 0.9  # of the measured pixels of an outline: where so many are seen, those without depth are too
+LEAST_MEASURED = 0.5  # of an outline: of what is measured less than that, what is seen is not known
 LEAST_PIECE = 0.1  # of the largest piece of a mask: smaller ones are noise
 LEAST_THERE = 0.5  # of the pixels that nothing is before, where the object has to be
 LEAST_SIDE = 6  # px of a box
@@ -81,8 +83,10 @@ def visible_part(thing: MappedObject, image: DepthImage, T_map_camera: Array) ->
     agrees, beyond = np.abs(off) <= tolerance, np.isfinite(off) & (off > tolerance)
     if agrees.sum() < LEAST_THERE * (agrees.sum() + beyond.sum()) or not agrees.any():
         return None
-    beside = cv2.dilate(agrees.astype(np.uint8), np.ones((2 * UNKNOWN_NEAR + 1,) * 2, np.uint8)) > 0
-    mask = _without_specks(agrees | (outline & ~known & beside))
+    unmeasured = _unmeasured(outline & ~known, agrees, outline & known & ~beyond)
+    if unmeasured is None:
+        return None
+    mask = _without_specks(agrees | unmeasured)
     seen = outline.sum() - (beyond & outline).sum()  # a part that is found to be free is no part of it
     part = VisiblePart(
         object=thing, mask=mask, corner=corner, off=np.where(mask, np.minimum(np.abs(off), 1.0), np.inf),
@@ -117,6 +121,18 @@ def _drawn(
     points = np.full((height, width), np.inf, np.float32)
     np.minimum.at(points, (v - y, u - x), z.astype(np.float32))
     return _closed(points, gap), (x, y), float(inside.mean())
+
+
+def _unmeasured(unknown: Array, agrees: Array, measured: Array) -> Array | None:
+    """The pixels (h, w) bool without depth that show the object; None where so many are unknown that nobody can say.
+
+    Depth lacks along borders, on what is dark or shines, and at the sides of a picture that it was registered to.
+    """
+    around = np.ones((2 * UNKNOWN_NEAR + 1,) * 2, np.uint8)
+    beside = unknown & (cv2.dilate(agrees.astype(np.uint8), around) > 0)
+    if (unknown & ~beside).sum() > (1.0 - LEAST_MEASURED) * (unknown.sum() + measured.sum()):
+        return None
+    return np.asarray(unknown if agrees.sum() >= FREE * measured.sum() else beside)
 
 
 def _closed(points: Array, gap: int) -> Array:

@@ -62,6 +62,7 @@ def test_a_name_names_an_object_in_all_pictures_and_is_written_to_be_changed(tmp
 def test_without_things_nothing_is_labelled_here(tmp_path: Path) -> None:
     written = export(tmp_path / "out", LabelOptions(named_only=True))
     assert not written.labels and written.unlabelled == COUNT and written.file.is_file()
+    assert read_names(tmp_path / "out" / "names.yaml") == {3: "thing"}  # to be named
 
 
 def test_a_folder_that_holds_something_is_refused_and_left(tmp_path: Path) -> None:

@@ -20,4 +20,4 @@ def test_each_object_has_its_id_its_class_and_its_crops() -> None:
 
 
 def test_a_run_without_objects_has_a_page_that_says_so() -> None:
-    assert "No object was seen" in labels_page("walk", [], {}, {}, {})
+    assert "No picture of this run shows" in labels_page("walk", [], {}, {}, {})

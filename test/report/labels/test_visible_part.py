@@ -48,6 +48,20 @@ def test_a_small_gap_in_the_depth_hides_nothing_but_a_picture_without_depth_show
     assert visible_part(square(), with_depth(0, 320, 0.0), np.eye(4)) is None
 
 
+def test_a_side_of_the_picture_without_depth_hides_nothing_where_most_is_measured() -> None:
+    part = part_of(with_depth(170, 320, 0.0))  # a third of the square
+    assert part.xyxy == pytest.approx(BOX, abs=1) and part.share == pytest.approx(1.0, abs=0.05)
+    assert visible_part(square(), with_depth(145, 320, 0.0), np.eye(4)) is None
+
+
+def test_what_is_not_measured_behind_something_is_not_taken_for_seen() -> None:
+    image = with_depth(0, 150, 0.6)
+    depth = image.depth.copy()
+    depth[:, 170:] = 0.0
+    part = part_of(replace(image, depth=depth))
+    assert part.xyxy == pytest.approx((150, 90, 175, 150), abs=1)
+
+
 def test_what_leaves_the_picture_is_seen_in_part() -> None:
     aside = square(at=(160 / 300, 0.0))  # its middle is upon the right border
     image = seen(shown=False)
