@@ -28,6 +28,7 @@ NAMES_NO_FILE = {
     *("first", "second"),  # times of pair
     "sha256",
     "intrinsics",
+    "pairs",
     "size",
     "lens",
     "settings",
