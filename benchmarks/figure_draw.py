@@ -37,7 +37,9 @@ def draw(repository: Path = REPOSITORY) -> None:
 def pages(repository: Path = REPOSITORY) -> dict[str, str]:
     """Each document by its name as it is when it is drawn from what ``results`` keeps."""
     drawn = {name: marked(name, (repository / name).read_text(encoding="utf-8")) for name in MARKED}
-    drawn["docs/figures.md"] = _template("figures.md.j2").render(topics=list(map(section, TOPICS)), version=version())
+    drawn["docs/figures.md"] = _template("figures.md.j2").render(
+        topics=list(map(section, TOPICS)), version=version(), place=place, usual=usual_place()
+    )
     drawn["docs/figures-history.md"] = _template("figures-history.md.j2").render(**history())
     return drawn
 
@@ -52,6 +54,17 @@ def current(topic: Topic) -> Result | None:
     """What was measured of the topic on the version that setup.py states; None where nothing was."""
     result = read_result(topic.name)
     return result if result is not None and result.version == version() else None
+
+
+def place(result: Result) -> str:
+    """When and where something was measured."""
+    return f"{result.date}, {result.cores} cores, {result.machine}"
+
+
+def usual_place() -> str:
+    """When and where most of the current topics were measured; the newest of them where there are several."""
+    places = [place(result) for result in map(current, TOPICS) if result is not None]
+    return max(sorted(places, reverse=True), key=places.count) if places else "no machine yet"
 
 
 def line(topic: Topic, row: Row, result: Result | None) -> Line:
