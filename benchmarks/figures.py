@@ -30,12 +30,14 @@ from figure_topics.topic import QUICK, WHOLE, Topic, shared_folder
 
 
 def wanted(topics: list[Topic], size: str, code: str, again: bool) -> list[Topic]:
-    """The topics that have no figures of this code yet, in this size or the whole one."""
-    return [topic for topic in topics if again or not _has(read_result(topic.name), size, code)]
+    """The topics that have no figures of this code and command yet, in this size or the whole one."""
+    return [topic for topic in topics if again or not _has(topic, read_result(topic.name), size, code)]
 
 
-def _has(result: Result | None, size: str, code: str) -> bool:
-    return result is not None and result.code == code and result.size in (size, WHOLE)
+def _has(topic: Topic, result: Result | None, size: str, code: str) -> bool:
+    if result is None or result.code != code or result.size not in (size, WHOLE):
+        return False
+    return result.command == topic.command(result.size)
 
 
 def measure_all(topics: list[Topic], workers: int, work: Callable[[Topic], Result]) -> list[str]:

@@ -25,7 +25,7 @@ def _usage(raw: Any) -> Values:
 def _delay(raw: Any, key: str) -> Values:
     row = _one(raw)[key]
     row = row.get("registrar") or row.get("all") or row
-    return {"p50": round(row["p50"]), "p95": round(row["p95"])}
+    return {rank: round(row[rank]) if rank in row else "no" for rank in ("p50", "p95")}
 
 
 def _start(raw: Any) -> Values:

@@ -7,14 +7,16 @@ from typing import Any
 
 from figure_topics.topic import Row, Topic, Values
 
+OURS = "objreg"  # as closure.py names it
+
 
 def _closed(raw: Any) -> Values:
-    ours = raw["total"]["ours"]
+    ours = raw["total"][OURS]
     return {**{key: ours[key] for key in ("constraints", "true", "false")}, **ours["recall"]["all"]}
 
 
 def _path(raw: Any) -> Values:
-    each = [row["methods"]["ours"]["ate_cm"] for row in raw["recordings"].values()]
+    each = [row["methods"][OURS]["ate_cm"] for row in raw["recordings"].values()]
     return {"path": "; ".join(f"{ate['before']:.1f} → {ate['after']:.1f} cm" for ate in each)}
 
 

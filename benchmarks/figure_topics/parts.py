@@ -142,7 +142,7 @@ TOPICS = (
         script="benchmarks/mapper.py scale --seed 1",
         quick="--poses 4000 --closures 200",
         whole="",
-        minutes=(0.5, 40),
+        minutes=(1, 40),
         rows=(
             Row(
                 "closure",

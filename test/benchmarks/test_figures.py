@@ -201,11 +201,15 @@ def test_a_marked_sentence_gets_its_figure(scripts: dict[str, ModuleType], kept:
 
 def test_a_run_goes_on_where_it_was(scripts: dict[str, ModuleType], kept: Path, result: Any) -> None:
     topics, wanted = scripts["figure_topics"].TOPICS, scripts["figures"].wanted
+    start = next(topic for topic in topics if topic.name == "start")
+    result.write(kept)
+    assert start in wanted(topics, "quick", "123", False)  # it is of another command
+    result = replace(result, command=start.command("quick"))
     result.write(kept)
     assert {t.name for t in topics} - {t.name for t in wanted(topics, "quick", "123", False)} == {"start"}
     assert len(wanted(topics, "quick", "other code", False)) == len(topics)
     assert len(wanted(topics, "whole", "123", False)) == len(topics)
-    replace(result, size="whole").write(kept)
+    replace(result, size="whole", command=start.command("whole")).write(kept)
     assert len(wanted(topics, "quick", "123", False)) == len(topics) - 1
 
 
