@@ -16,6 +16,6 @@ README = {
     "robots.constraints": "constraints of three simulated robots and one registrar",
     "robots.met": "the same: stretches where two met that are tied; error of the one map",
     "latency.usage": "live at 30 Hz, four objects, all nodes in one process",
-    "latency.constraint": "from an image to the constraints about it",
+    "latency.constraint": "from an image to the constraints about it, once the camera is proven",
     "start.one": "all nodes in one process until they listen",
 }  # the rows that README shows, by their claims there
