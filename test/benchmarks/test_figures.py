@@ -34,7 +34,6 @@ MEASURED = re.compile(
 SET = {
     "README.md": ("70 to 180 degrees", "the model's own, 0.5 where it says none"),
     "docs/limits.md": (
-        "worse by more than 1.3 times",  # the bound of the figure that follows
         "a jitter of 3° and 4 cm",  # what its command asks for
         "70 to 180 degrees",
         "from 3 m and more",
