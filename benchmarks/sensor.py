@@ -66,7 +66,7 @@ def measured(sensor: str, rig: RigParams, seed: int, count: int, rate: float) ->
         found.append(stream.offset(image).rotation)
         true.append(rotation)
         estimate.register(image)
-        view = reduced_view(image, step_for(image.depth.shape[1], VIEW_STEP), NEAREST_M, FARTHEST_M)
+        view = reduced_view(image, step_for(image.intrinsics, VIEW_STEP), NEAREST_M, FARTHEST_M)
         noise.append(depth_noise(np.nan_to_num(view.xyz[..., 2])))
     degrees = {"found": np.degrees(found[FIRST:]), "true": np.degrees(true[FIRST:])}
     off = np.linalg.norm(degrees["found"] - degrees["true"], axis=1)

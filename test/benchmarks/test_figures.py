@@ -279,7 +279,7 @@ def test_a_topic_that_takes_too_long_is_ended_with_what_it_started(
     code += "process = subprocess.Popen(['sleep', '60'])\n"
     code += f"pathlib.Path({str(tmp_path / 'pid')!r}).write_text(str(process.pid))\ntime.sleep(60)\n"
     with pytest.raises(scripts["figure_run"].TopicError, match="expected an end within"):
-        measured(scripts, tmp_path, monkeypatch, code, minutes=(0.2, 0.2))
+        measured(scripts, tmp_path, monkeypatch, code, minutes=(0.12, 0.12))
     until_s, pid = time.monotonic() + 20.0, int((tmp_path / "pid").read_text())
     while runs(pid) and time.monotonic() < until_s:
         time.sleep(0.05)
