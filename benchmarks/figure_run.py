@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +18,7 @@ import figure_results
 from figure_topics.topic import QUICK, REPOSITORY, Topic, shared_folder
 
 OUT = REPOSITORY / "out/figures"
+STOP = threading.Event()  # set where the run is ended: what is running ends, too
 SEED = re.compile(r"--(?:first-)?seed (\d+)|[a-z-]+:(\d+(?:,\d+)*)")
 
 
@@ -97,7 +99,7 @@ def _run(argv: list[str], log: Path, limit_s: float, ends: tuple[int, ...]) -> t
 
 def _wait(process: subprocess.Popen[bytes], until_s: float) -> float | None:
     """The seconds of the processor that it and its ended children took; None where it has not ended in time."""
-    while time.monotonic() < until_s:
+    while time.monotonic() < until_s and not STOP.is_set():
         pid, status, usage = os.wait4(process.pid, os.WNOHANG)
         if pid:
             process.returncode = os.waitstatus_to_exitcode(status)

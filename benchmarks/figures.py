@@ -16,15 +16,16 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import sys
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import click
 from figure_draw import draw
 from figure_results import CURRENT, RESULTS, Result, code_of, read_result
-from figure_run import TopicError, measure
+from figure_run import STOP, TopicError, measure
 from figure_topics import TOPICS
 from figure_topics.topic import QUICK, WHOLE, Topic, shared_folder
 
@@ -46,7 +47,7 @@ def measure_all(topics: list[Topic], workers: int, work: Callable[[Topic], Resul
     for some, count in (([t for t in topics if not t.alone], workers), ([t for t in topics if t.alone], 1)):
         with ThreadPoolExecutor(count) as pool:
             running = {pool.submit(work, topic): topic for topic in some}
-            for future in as_completed(running):
+            for future in _ended(running, pool):
                 name = running[future].name
                 try:
                     result = future.result()
@@ -56,6 +57,17 @@ def measure_all(topics: list[Topic], workers: int, work: Callable[[Topic], Resul
                 else:
                     click.echo(f"{name}: {result.seconds:.0f} s, {result.processor_seconds:.0f} s of the processor")
     return failed
+
+
+def _ended(running: dict[Future[Result], Topic], pool: ThreadPoolExecutor) -> Iterator[Future[Result]]:
+    """The topics as they end; all are ended where one stops the run."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield from as_completed(running)
+    except BaseException:
+        STOP.set()
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
 
 
 def _names(_context: click.Context, _option: click.Parameter, text: str) -> list[Topic]:
