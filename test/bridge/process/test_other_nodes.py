@@ -3,10 +3,6 @@
 
 from __future__ import annotations
 
-import pytest
-
-pytest.importorskip("rclpy")
-
 from rclpy.parameter import Parameter
 
 from objreg_ros.bridge.process.other_nodes import ParameterReader, values_of
