@@ -22,7 +22,7 @@ from objreg_ros.sensor import CONFIDENCE, SIGMA_DEG
 from objreg_tools.cli.commands.simulate import HARD
 from objreg_tools.simulation.params import StressParams
 from objreg_tools.simulation.rendering.render import render
-from objreg_tools.simulation.scenarios import SCENARIOS, make_plan
+from objreg_tools.simulation.scenarios import OF_ONE_DAY, make_plan
 from objreg_tools.simulation.sensors.camera import CAMERAS, SENSORS
 
 MARGIN = 1.5
@@ -40,7 +40,7 @@ EDGES = (
 
 def tilts(seeds: int, frames: int) -> Iterator[tuple[float, float]]:
     """The confidence and the squared tilt in degrees² of every view that has gravity."""
-    runs = [(s, n, k) for s in SENSORS for n in SCENARIOS for k in range(seeds)]
+    runs = [(s, n, k) for s in SENSORS for n in OF_ONE_DAY for k in range(seeds)]
     for sensor, scenario, seed in tqdm(runs, unit="room"):
         name, depth = SENSORS[sensor]
         camera = CAMERAS[name]

@@ -13,7 +13,7 @@ import numpy as np
 from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_tools.simulation.rendering.light import Lamp, looking
-from objreg_tools.simulation.scenarios import SCENARIOS, make_plan
+from objreg_tools.simulation.scenarios import OF_ONE_DAY, make_plan
 from objreg_tools.simulation.world import furniture, texture
 from objreg_tools.simulation.world.distractors import make_distractor
 from objreg_tools.simulation.world.mesh import Material, Mesh, box
@@ -54,7 +54,7 @@ def training_scene(rng: Rng) -> tuple[Scene, Array]:
     if kind < 0.4:
         scene = random_scene(_seed(rng), distractor_share=rng.uniform(0.1, 0.6))
     elif kind < 0.65:
-        plan = make_plan(str(rng.choice(list(SCENARIOS))), _seed(rng), PLAN_FRAMES, occluders=int(rng.integers(3)))
+        plan = make_plan(str(rng.choice(list(OF_ONE_DAY))), _seed(rng), PLAN_FRAMES, occluders=int(rng.integers(3)))
         scene, poses = plan.scenes[0], plan.T_world_camera[plan.scene_of == 0]
     elif kind < 0.8:
         scene = desk(rng)
@@ -93,7 +93,7 @@ def with_look_alikes(scene: Scene, rng: Rng) -> Scene:
 
 def _story(rng: Rng) -> tuple[Scene, Array]:
     """One of the scenes of a scenario and the camera poses in it."""
-    plan = make_plan(str(rng.choice(list(SCENARIOS))), _seed(rng), PLAN_FRAMES)
+    plan = make_plan(str(rng.choice(list(OF_ONE_DAY))), _seed(rng), PLAN_FRAMES)
     chosen = int(rng.integers(len(plan.scenes)))
     return plan.scenes[chosen], plan.T_world_camera[plan.scene_of == chosen]
 

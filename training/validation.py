@@ -25,7 +25,7 @@ from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_tools.report.run.average_precision import TrueBoxes, average_precision
 from objreg_tools.simulation.rendering.render import Rendering, render
-from objreg_tools.simulation.scenarios import SCENARIOS, make_plan
+from objreg_tools.simulation.scenarios import OF_ONE_DAY, make_plan
 from objreg_tools.simulation.world.scene import Scene, random_scene, random_view
 from training.labels import LABELS
 from training.samples import Sample, Shard, write_shard
@@ -113,7 +113,7 @@ def _views(number: int) -> Iterator[tuple[Scene, Array]]:
     """Scenes and ``T_world_camera`` of one round."""
     scene = random_scene(number)
     yield from ((scene, random_view(scene, number + view)) for view in range(VIEWS_PER_SCENE))
-    plan = make_plan(list(SCENARIOS)[number % len(SCENARIOS)], number, PLAN_FRAMES)
+    plan = make_plan(list(OF_ONE_DAY)[number % len(OF_ONE_DAY)], number, PLAN_FRAMES)
     for frame in np.linspace(0, PLAN_FRAMES - 1, VIEWS_PER_SCENE + 2).astype(int)[1:-1]:
         yield plan.scenes[plan.scene_of[frame]], plan.T_world_camera[frame]
 

@@ -9,6 +9,7 @@
 | `look-alikes` | like `loop`, but the two tables are alike and things of the same classes lie on them |
 | `posters` | like `look-alikes`, and every picture on the walls is one of two |
 | `moved` | like `loop`, but the things on the first table are rearranged while the second is looked at |
+| `days` | two rounds, and two a day later, when a third of all things in the room stand elsewhere |
 
 A round leads along one long wall to the second table and along the other one back.
 """
@@ -34,6 +35,7 @@ from objreg_tools.simulation.world.rooms import (
     Spot,
     along_the_walls,
     chairs_at,
+    moved_about,
     on_the_boards,
     places_of,
     table_with,
@@ -48,8 +50,8 @@ HALF_WIDTH_OF_TABLES = 0.8
 DETOUR_M = 1.4
 """How far from the straight line a round leads."""
 NEAR_M = 0.3
-Plot = tuple[tuple[Scene, ...], list[Waypoint], Waypoint | None]
-"""The scenes, the camera's path, and the waypoint at which the second scene takes over."""
+Plot = tuple[tuple[Scene, ...], list[Waypoint], Waypoint | float | None]
+"""The scenes, the camera's path, and where the second scene takes over: a waypoint, or a share of the frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,7 @@ class _Setting:
     tables: tuple[tuple[Furniture, Array], ...]
     on_table: tuple[Laid, ...]
     others: Laid
+    walls: tuple[tuple[Furniture, Array], ...]
 
     def scene_with(self, on_table: tuple[Laid, ...]) -> Scene:
         return self.scene.with_objects(number([*(item for laid in on_table for item in laid), *self.others]))
@@ -101,7 +104,7 @@ def _setting(rng: Random, occluders: int, alike: bool = False, posters: Sequence
     others = [item for piece, T in tables for item in chairs_at(rng, piece, T, int(rng.integers(1, 3)))]
     others += on_the_boards(rng, walls)
     scene = furnished(rng, [*tables, *walls], room, lamp_count=2)
-    return _Setting(replace(scene, places=places_of(tables)), tables, laid, others)
+    return _Setting(replace(scene, places=places_of(tables)), tables, laid, others, tuple(walls))
 
 
 def _spots() -> list[Spot]:
@@ -211,6 +214,17 @@ def _moved(rng: Random, occluders: int) -> Plot:
     return (before, after), _rounds(setting, looks), at_the_second[len(at_the_second) // 2]
 
 
+def _days(rng: Random, occluders: int) -> Plot:
+    setting = _setting(rng, occluders)
+    side = float(rng.choice([-1, 1]))
+    asides = [side * float(rng.uniform(*degrees)) for degrees in ((15, 35), (-35, -15), (5, 25))]
+    laid = [item for table in setting.on_table for item in table] + setting.others
+    boards = [(piece, T) for piece, T in (*setting.tables, *setting.walls) if piece.boards]
+    before = setting.scene_with(setting.on_table)
+    after = before.with_objects(number(moved_about(rng, laid, boards, setting.tables)))
+    return (before, _same_numbers(before, after)), _rounds(setting, _looks(rng, setting, asides)), 0.5
+
+
 def _same_numbers(before: Scene, after: Scene) -> Scene:
     """The scene with every model's instance number of ``before``: rearranged things keep their numbers."""
     numbers = {id(o.model): o.instance for o in before.objects}
@@ -224,7 +238,10 @@ SCENARIOS: dict[str, Callable[[Random, int], Plot]] = {
     "look-alikes": _alike,
     "moved": _moved,
     "posters": _posters,
+    "days": _days,
 }
+OF_ONE_DAY = tuple(name for name in SCENARIOS if name != "days")
+"""What training draws from."""
 
 
 def make_plan(scenario: str, seed: int, frames: int = 600, rate: float = 30.0, occluders: int = 0) -> RecordingPlan:
@@ -240,7 +257,7 @@ def make_plan(scenario: str, seed: int, frames: int = 600, rate: float = 30.0, o
     poses, rate = carried(waypoints, frames, rate, rng, Hand())
     scene_of = np.zeros(frames, int)
     if change is not None:
-        scene_of[_first_passing(poses, change) :] = 1
+        scene_of[round(change * frames) if isinstance(change, float) else _first_passing(poses, change) :] = 1
     return RecordingPlan(scenes, scene_of, poses, rate)
 
 

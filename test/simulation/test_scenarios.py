@@ -107,3 +107,16 @@ def crowd(scene: Scene) -> int:
 def test_an_unknown_scenario_is_refused_with_those_there_are() -> None:
     with pytest.raises(ValueError, match="expected one of orbit, loop"):
         make_plan("maze", 0)
+
+
+def test_a_third_of_the_things_stand_elsewhere_on_the_second_of_two_days() -> None:
+    plan = make_plan("days", 0, frames=60)
+    before, after = ({o.instance: o for o in scene.objects} for scene in plan.scenes)
+    assert set(after) <= set(before) and plan.scene_of.tolist() == [0] * 30 + [1] * 30
+    apart = [float(np.linalg.norm(after[k].T_world_object[:3, 3] - before[k].T_world_object[:3, 3])) for k in after]
+    elsewhere = [metres for metres in apart if metres > 0.0]
+    assert len(elsewhere) + len(before) - len(after) == round(len(before) / 3) and min(elsewhere) >= 0.4
+
+
+def test_training_draws_from_scenarios_of_one_day() -> None:
+    assert set(SCENARIOS) - set(scenarios.OF_ONE_DAY) == {"days"}

@@ -13,7 +13,7 @@ from objreg_tools.simulation.world import distractors, furniture
 from objreg_tools.simulation.world.furniture import Furniture
 from objreg_tools.simulation.world.model import ObjectModel, turn
 from objreg_tools.simulation.world.objects import make_object
-from objreg_tools.simulation.world.scene import Place, place_on, spread
+from objreg_tools.simulation.world.scene import Place, footprint, place_on, spread
 
 Random = np.random.Generator
 Laid = list[tuple[ObjectModel, Array]]
@@ -23,6 +23,9 @@ Spot = tuple[float, float, float]
 
 TABLE_CLASSES = ("cereal_box", "soda_can", "bowl", "book", "cap", "flashlight", "keyboard", "monitor")
 OCCLUDERS = ("mug", "bottle", "carton", "vase", "tin", "plant", "ball")
+MOVED_M = 0.4  # what was moved stands at least so far from where it stood
+GAP_M = 0.02
+SAME_BOARD_M = 0.3  # what stands higher or lower than this is on another board
 
 
 def table_with(rng: Random, piece: Furniture, T: Array, models: list[ObjectModel], occluders: int) -> Laid:
@@ -47,10 +50,14 @@ def chairs_at(rng: Random, piece: Furniture, T: Array, count: int) -> Laid:
     laid: Laid = []
     for side in rng.permutation([-1, 1])[:count]:
         model = make_object("chair", int(rng.integers(2**31)))
-        yaw = (0.0 if side > 0 else np.pi) + rng.normal(0, 0.25)
-        local = place_on(model, np.eye(4), rng.uniform(-0.35, 0.35), side * (half_y + rng.uniform(0.2, 0.4)), yaw)
-        laid.append((model, T @ local))
+        laid.append((model, T @ _at_the_side(rng, model, half_y, int(side))))
     return laid
+
+
+def _at_the_side(rng: Random, chair: ObjectModel, half_y: float, side: int) -> Array:
+    """``T_table_chair`` of a chair at a long side of a table, turned to it."""
+    yaw = (0.0 if side > 0 else np.pi) + rng.normal(0, 0.25)
+    return place_on(chair, np.eye(4), rng.uniform(-0.35, 0.35), side * (half_y + rng.uniform(0.2, 0.4)), yaw)
 
 
 def on_the_boards(rng: Random, pieces: Sequence[tuple[Furniture, Array]]) -> Laid:
@@ -80,3 +87,49 @@ def along_the_walls(rng: Random, spots: Sequence[Spot]) -> list[tuple[Furniture,
 def places_of(tables: Sequence[tuple[Furniture, Array]]) -> tuple[Place, ...]:
     """The places just above the tops of tables."""
     return tuple(Place(transform(T, np.array([0, 0, p.boards[0][2] + 0.08])), p.boards[0][3]) for p, T in tables)
+
+
+def moved_about(
+    rng: Random, laid: Laid, boards: Sequence[tuple[Furniture, Array]], tables: Sequence[tuple[Furniture, Array]]
+) -> Laid:
+    """What is ``laid``, a third of it elsewhere: on any of the ``boards``, chairs at the ``tables``.
+
+    It stands `MOVED_M` or more from where it stood. What finds no spot after some trials is carried out of the room.
+    """
+    now: list[tuple[ObjectModel, Array] | None] = list(laid)
+    for k in rng.permutation(len(laid))[: round(len(laid) / 3)]:
+        (model, before), now[k] = laid[k], None
+        others = [item for item in now if item is not None]
+        spots = (_some_spot(rng, model, tables if model.label == "chair" else boards) for _ in range(200))
+        free = (T for T in spots if T is not None and _is_free(model, T, before, others))
+        T = next(free, None)
+        now[k] = None if T is None else (model, T)
+    return [item for item in now if item is not None]
+
+
+def _some_spot(rng: Random, model: ObjectModel, pieces: Sequence[tuple[Furniture, Array]]) -> Array | None:
+    """A pose in the world at random, on a board of a piece or, of a chair, beside it; None if it does not fit there."""
+    piece, T = pieces[int(rng.integers(len(pieces)))]
+    if model.label == "chair":
+        return T @ _at_the_side(rng, model, piece.boards[0][4], int(rng.choice([-1, 1])))
+    x, y, height, half_x, half_y = piece.boards[int(rng.integers(min(4, len(piece.boards))))]
+    _, radius = footprint(model, np.eye(4))
+    if radius > 1.3 * max(half_x, half_y) or model.size[2] > piece.clearance:
+        return None
+    at_x, at_y = (c + rng.uniform(-1, 1) * max(half - 0.7 * radius, 0.0) for c, half in ((x, half_x), (y, half_y)))
+    board = np.eye(4)
+    board[2, 3] = height
+    return T @ place_on(model, board, at_x, at_y, float(rng.uniform(0, 2 * np.pi)))
+
+
+def _is_free(model: ObjectModel, T: Array, before: Array, others: Laid) -> bool:
+    """Whether a thing may stand at a pose: far from where it was ``before``, and apart from the ``others``."""
+    if np.linalg.norm(T[:3, 3] - before[:3, 3]) < MOVED_M:
+        return False
+    middle, radius = footprint(model, T)
+    for other, P in others:
+        at, reach = footprint(other, P)
+        is_beside = abs(T[2, 3] - P[2, 3]) < SAME_BOARD_M
+        if is_beside and np.linalg.norm(middle - at) < radius + reach + GAP_M:
+            return False
+    return True

@@ -124,7 +124,7 @@ def spread(
     surface = pose(np.eye(3), np.array([x0, y0, height]))
     for k, model in enumerate(models):
         rest = int(rng.integers(1, len(model.rests) + 1)) if model.rests and rng.random() < 0.2 else 0
-        radius = _footprint(model, rest)
+        _, radius = footprint(model, model.resting(rest, 0.0))
         room = (max(half_x - 0.7 * radius, 0.0), max(half_y - 0.7 * radius, 0.0))
         close = taken if k >= len(models) - beside else []
         if radius > 1.3 * max(half_x, half_y) or model.size[2] > clearance:
@@ -151,12 +151,12 @@ def _spot(
     return float(np.clip(x, -room[0], room[0])), float(np.clip(y, -room[1], room[1]))
 
 
-def _footprint(model: ObjectModel, rest: int) -> float:
-    """A radius of the footprint, between its inner and its outer circle: close neighbours, hardly any overlap."""
-    T = model.resting(rest, 0.0)
+def footprint(model: ObjectModel, T_world_object: Array) -> tuple[Array, float]:
+    """The middle (2,) and a radius of the footprint: between its inner and its outer circle, hardly any overlap."""
+    T = T_world_object
     xy = model.mesh.vertices @ T[:2, :3].T.astype(np.float32) + T[:2, 3].astype(np.float32)
     half = (xy.max(0) - xy.min(0)) / 2
-    return float(0.5 * (np.hypot(*half) + half.max()))
+    return (xy.max(0) + xy.min(0)) / 2, float(0.5 * (np.hypot(*half) + half.max()))
 
 
 def some_models(rng: Random, count: int, distractor_share: float, labels: Sequence[str] = LABELS) -> list[ObjectModel]:

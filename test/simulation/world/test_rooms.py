@@ -8,7 +8,16 @@ import pytest
 
 from objreg_tools.simulation.world import furniture
 from objreg_tools.simulation.world.model import turn
-from objreg_tools.simulation.world.rooms import along_the_walls, chairs_at, on_the_boards, places_of, table_with, things
+from objreg_tools.simulation.world.rooms import (
+    along_the_walls,
+    chairs_at,
+    moved_about,
+    on_the_boards,
+    places_of,
+    table_with,
+    things,
+)
+from objreg_tools.simulation.world.scene import footprint
 
 
 def rng() -> np.random.Generator:
@@ -60,3 +69,26 @@ def test_a_place_is_just_above_the_top_of_its_table() -> None:
     place = places_of([(table, T)])[0]
     np.testing.assert_allclose(place.centre, [2.0, 1.0, table.boards[0][2] + 0.08])
     assert place.reach == pytest.approx(0.67)
+
+
+def test_a_third_of_what_is_laid_is_moved_to_free_spots_of_the_boards() -> None:
+    table, shelf, T = furniture.table(rng(), (1.6, 0.9)), furniture.shelf(rng()), np.eye(4)
+    T[:2, 3] = [3.0, 0.0]
+    laid = table_with(rng(), table, np.eye(4), things(rng(), 6, 0), 0) + chairs_at(rng(), table, np.eye(4), 2)
+    now = moved_about(rng(), laid, [(table, np.eye(4)), (shelf, T)], [(table, np.eye(4))])
+    before = {id(model): P for model, P in laid}
+    moved = [(model, P) for model, P in now if P is not before[id(model)]]
+    assert len(moved) + len(laid) - len(now) == round(len(laid) / 3) and moved
+    for model, P in moved:
+        assert np.linalg.norm(P[:3, 3] - before[id(model)][:3, 3]) >= 0.4
+        at, radius = footprint(model, P)
+        near = [footprint(m, Q) for m, Q in now if m is not model and abs(Q[2, 3] - P[2, 3]) < 0.3]
+        assert all(np.linalg.norm(at - other) > radius + reach for other, reach in near)
+
+
+def test_what_finds_no_spot_is_carried_out_of_the_room() -> None:
+    table = furniture.table(rng(), (1.4, 0.8))
+    small = furniture.Furniture(table.mesh, ((0.0, 0.0, 0.7, 0.01, 0.01),), 0.5)
+    laid = table_with(rng(), table, np.eye(4), things(rng(), 6, 0), 0)
+    now = moved_about(rng(), laid, [(small, np.eye(4))], [(table, np.eye(4))])
+    assert len(now) == len(laid) - round(len(laid) / 3)
