@@ -12,6 +12,9 @@ and counted apart as drifted: between two closures both sessions' odometry drift
     python benchmarks/relocalisation.py --quick
     python benchmarks/relocalisation.py --simulate moved:0,1,2,3,4 --simulate loop:0,1,2,3,4 --starts 4 --json OUT
     python benchmarks/relocalisation.py REC --threshold 0.4 --starts 6
+    python benchmarks/relocalisation.py --days --simulate days:100,101 --json OUT
+
+With --days the second half is one session, and each of its keyframes is judged: see `days.py`.
 """
 
 from __future__ import annotations
@@ -19,97 +22,31 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 import cv2
+import days
 import numpy as np
 from closure import plans, simulated
 from command_line import quick_values
-from sources import detector_of, read_source
+from sessions import LATER_NS, Earlier, begun_anew, remember
+from sources import Source, detector_of, read_source
 
-from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure
-from objreg_ros.data.frames import UNNAMED, Frame
-from objreg_ros.geometry import inverse, pose_error, transform
+from objreg_ros.data.frames import Frame
+from objreg_ros.geometry import pose_error
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registration.keyframe import bounding_box
 from objreg_tools.truth import FALSE, Truth, within
 
 WITHIN_S = 5.0
-NEAR_M = 0.3  # an object that is known stands no farther from where it stood
-LATER_NS = 10**15  # the later sessions' clock goes on long after the earlier one
 QUICK = {"frames": 160, "starts": 1}
-
-
-@dataclass
-class Earlier:
-    """What the earlier session knew: where the world was in its odometry, moment by moment, and its objects in it."""
-
-    stamps_ns: list[int]
-    T_odom_world: list[Array]
-    objects: list[tuple[str, Array]]
-
-    @classmethod
-    def of(cls, frames: Iterable[Frame], truth: Truth) -> Earlier:
-        """Of the frames of the earlier session."""
-        made = cls([], [], [])
-        for frame in frames:
-            T = truth.at(frame.stamp_ns)
-            if T is not None and frame.T_odom_camera is not None:
-                made.stamps_ns.append(frame.stamp_ns)
-                made.T_odom_world.append(frame.T_odom_camera @ inverse(T))
-                made.objects += objects_of(frame, T)
-        return made
-
-    def knows(self, frame: Frame, T_world_camera: Array) -> bool:
-        """Whether a frame shows an object where it was before."""
-        seen = objects_of(frame, T_world_camera)
-        return any(
-            label == name and np.linalg.norm(xyz - at) < NEAR_M for label, xyz in seen for name, at in self.objects
-        )
-
-    def T_map_camera(self, T_world_camera: Array, beside_ns: int) -> Array:
-        """Where a true pose (4, 4) is in its map, by its odometry at a moment of its own."""
-        return self.T_odom_world[int(np.argmin(np.abs(np.array(self.stamps_ns) - beside_ns)))] @ T_world_camera
-
-
-def objects_of(frame: Frame, T_world_camera: Array) -> list[tuple[str, Array]]:
-    """The label and the true middle (3,) of each object with a name."""
-    named = [cloud for cloud in frame.objects if cloud.label != UNNAMED and len(cloud)]
-    return [(cloud.label, transform(T_world_camera, bounding_box(cloud.xyz)[0])) for cloud in named]
-
-
-def begun_anew(frames: Sequence[Frame]) -> list[Frame]:
-    """The frames long after, in odometry that begins where the first camera stands, turned about its z axis only."""
-    first = next(frame.T_odom_camera for frame in frames if frame.T_odom_camera is not None)
-    yaw = np.arctan2(first[1, 2], first[0, 2])  # of the line of sight
-    T = np.eye(4)
-    T[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
-    T[:3, 3] = first[:3, 3]
-    back = inverse(T)
-    return [
-        replace(
-            frame,
-            stamp_ns=frame.stamp_ns + LATER_NS,
-            T_odom_camera=None if frame.T_odom_camera is None else back @ frame.T_odom_camera,
-        )
-        for frame in frames
-    ]
-
-
-def remember(store: Path, frames: Iterable[Frame], params: RegistrarParams) -> None:
-    """Make the store of the earlier session, with its closures."""
-    with closing(Registrar(params.replaced(store=str(store)))) as registrar:
-        for frame in frames:
-            registrar.process(frame)
-        registrar.finish()
 
 
 def wake(
@@ -205,11 +142,28 @@ def line(name: str, told: dict[str, Any]) -> str:
 HEAD = f"{'recording':28} {'sessions':>8} {'within 5 s':>16} {'median s':>9} {'false':>6} {'answers':>8} {'drifted':>8}"
 
 
+class Asked(NamedTuple):
+    """What is measured: the rows of a recording, their summary, and a row of the table with its head."""
+
+    head: str
+    rows: Callable[[Source, RegistrarParams], list[dict[str, Any]]]
+    summary: Callable[[Sequence[dict[str, Any]]], dict[str, Any]]
+    line: Callable[[str, dict[str, Any]], str]
+
+
+def asked_of(by_days: bool, starts: int) -> Asked:
+    """Whether keyframes of the second half are judged, or ``starts`` in it."""
+    if by_days:
+        return Asked(days.HEAD, lambda source, params: days.measure(source.frames, source.truth, params), *days.TABLE)
+    return Asked(HEAD, lambda source, params: measure(source.frames, source.truth, params, starts), summary, line)
+
+
 @click.command(help=__doc__)
 @click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path))
 @click.option("--simulate", "scenarios", multiple=True, metavar="SCENARIO:SEED,SEED…", help="Simulate these, use them.")
 @click.option("--frames", default=600, show_default=True, help="Frames of a simulated recording.")
 @click.option("--starts", default=4, show_default=True, type=click.IntRange(min=1), help="Later sessions of each.")
+@click.option("--days", "by_days", is_flag=True, help="Judge every keyframe of the second half: the next day.")
 @click.option("--model", default="", help="ONNX model; `truth`: a simulation's boxes.")
 @click.option("--threshold", default=0.5, show_default=True, help="Least score of a detection; COCO models want 0.4.")
 @click.option("--seed", default=1, show_default=True, help="Seed of the synthetic drift and of the registrar.")
@@ -231,17 +185,18 @@ def main(
     paths = [partial(Path, path) for path in recordings]
     paths += [partial(simulated, keep, *plan, options["frames"]) for plan in told]
     rows: dict[str, list[dict[str, Any]]] = {}
-    click.echo(HEAD)
+    asked = asked_of(options["by_days"], options["starts"])
+    click.echo(asked.head)
     for make in paths:
         path = make()
         with read_source(path, detector_of(options["model"], options["threshold"]), options["seed"]) as source:
             params = RegistrarParams(seed=options["seed"]).replaced(**source.camera)
-            rows[path.name] = measure(source.frames, source.truth, params, options["starts"])
-        click.echo(line(path.name, summary(rows[path.name])))
+            rows[path.name] = asked.rows(source, params)
+        click.echo(asked.line(path.name, asked.summary(rows[path.name])))
         if out is not None:
-            total = summary([row for of in rows.values() for row in of])
+            total = asked.summary([row for of in rows.values() for row in of])
             out.write_text(json.dumps({"total": total, "recordings": rows}, indent=1) + "\n", encoding="utf-8")
-    click.echo(line("all", summary([row for of in rows.values() for row in of])))
+    click.echo(asked.line("all", asked.summary([row for of in rows.values() for row in of])))
 
 
 if __name__ == "__main__":
