@@ -124,13 +124,13 @@ def summary(rows: Sequence[Row]) -> Row:
     }
 
 
-def line(name: str, told: Row) -> str:
+def line(name: str, figures: Row) -> str:
     """A row of the table."""
-    near = f"{told['near']} = {told['near_share']:.3f}"
-    strict = f"{told['strict']} = {told['strict_share']:.3f}"
-    wrong = f"{told['wrong']} of {told['answers']}"
-    closures = f"{told['wrong_closures']} of {told['closures']}"
-    counts = f"{told['keyframes']:>9} {told['could']:>10} {told['closed']:>7}"
+    near = f"{figures['near']} = {figures['near_share']:.3f}"
+    strict = f"{figures['strict']} = {figures['strict_share']:.3f}"
+    wrong = f"{figures['wrong']} of {figures['answers']}"
+    closures = f"{figures['wrong_closures']} of {figures['closures']}"
+    counts = f"{figures['keyframes']:>9} {figures['could']:>10} {figures['closed']:>7}"
     return f"{name:28} {counts} {near:>13} {strict:>13} {wrong:>11} {closures:>14}"
 
 

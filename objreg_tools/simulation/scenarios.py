@@ -9,7 +9,7 @@
 | `look-alikes` | like `loop`, but the two tables are alike and things of the same classes lie on them |
 | `posters` | like `look-alikes`, and every picture on the walls is one of two |
 | `moved` | like `loop`, but the things on the first table are rearranged while the second is looked at |
-| `days` | two rounds, and two a day later, when a third of all things in the room stand elsewhere |
+| `days` | two rounds, and two a day later, when a third of all things stand elsewhere |
 
 A round leads along one long wall to the second table and along the other one back.
 """

@@ -30,11 +30,11 @@ def test_keyframes_of_two_known_objects_count_and_wrong_answers_always_do() -> N
         row(1, [1.0, 60.0]),
         row(0, None, [[9.0, 2.0]]),
     ]
-    told = summary(rows)
-    assert (told["keyframes"], told["could"], told["closed"], told["answered"]) == (5, 3, 1, 2)
-    assert (told["near"], told["strict"], told["near_share"], told["strict_share"]) == (2, 1, 0.667, 0.333)
-    assert (told["wrong"], told["answers"], told["wrong_closures"], told["closures"]) == (1, 3, 1, 2)
-    assert told["missed_by_reason"] == {"odds": 1}
+    figures = summary(rows)
+    assert (figures["keyframes"], figures["could"], figures["closed"], figures["answered"]) == (5, 3, 1, 2)
+    assert (figures["near"], figures["strict"], figures["near_share"], figures["strict_share"]) == (2, 1, 0.667, 0.333)
+    assert (figures["wrong"], figures["answers"], figures["wrong_closures"], figures["closures"]) == (1, 3, 1, 2)
+    assert figures["missed_by_reason"] == {"odds": 1}
 
 
 def test_the_table_shows_shares_beside_their_counts() -> None:

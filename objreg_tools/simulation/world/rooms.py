@@ -94,7 +94,7 @@ def moved_about(
 ) -> Laid:
     """What is ``laid``, a third of it elsewhere: on any of the ``boards``, chairs at the ``tables``.
 
-    It stands `MOVED_M` or more from where it stood. What finds no spot after some trials is carried out of the room.
+    It stands `MOVED_M` or more from where it stood. What finds no spot after some trials is taken away.
     """
     now: list[tuple[ObjectModel, Array] | None] = list(laid)
     for k in rng.permutation(len(laid))[: round(len(laid) / 3)]:

@@ -86,7 +86,7 @@ def test_a_third_of_what_is_laid_is_moved_to_free_spots_of_the_boards() -> None:
         assert all(np.linalg.norm(at - other) > radius + reach for other, reach in near)
 
 
-def test_what_finds_no_spot_is_carried_out_of_the_room() -> None:
+def test_what_finds_no_spot_is_taken_away() -> None:
     table = furniture.table(rng(), (1.4, 0.8))
     small = furniture.Furniture(table.mesh, ((0.0, 0.0, 0.7, 0.01, 0.01),), 0.5)
     laid = table_with(rng(), table, np.eye(4), things(rng(), 6, 0), 0)
