@@ -123,6 +123,30 @@ TOPICS = (
         about="A later session begins anywhere in a place that an earlier one stored.",
     ),
     Topic(
+        name="days",
+        title="The next day",
+        script="benchmarks/relocalisation.py --seed 1 --days --keep KEEP",
+        quick="RPY --model COCO --threshold 0.4",
+        whole="KITCHEN RPY --model COCO --threshold 0.4 --simulate days:100,101,102,103",
+        minutes=(1.5, 25),
+        rows=(
+            Row(
+                "near",
+                "keyframes that show two stored objects and are known within 0.5 m; within 5 cm and 3°",
+                "{near} and {strict} of {could}",
+                lambda raw: {key: raw["total"][key] for key in ("near", "strict", "could")},
+            ),
+            Row(
+                "wrong",
+                "answers beyond 8° or 15 cm; closures",
+                "{wrong} of {answers}; {wrong_closures} of {closures}",
+                lambda raw: {key: raw["total"][key] for key in ("wrong", "answers", "wrong_closures", "closures")},
+            ),
+        ),
+        about="The second half of each recording is one session upon the map of the first; in the simulated ones a "
+        "third of all things stand elsewhere by then. An answer is a closure, or an earlier one and odometry.",
+    ),
+    Topic(
         name="rooms",
         title="Beside other rooms in the store",
         script="benchmarks/rooms.py --seed 1 --keep KEEP",
