@@ -11,6 +11,8 @@ from objreg_mapper.optimisation.edges import Edges, whitened_errors
 from objreg_mapper.optimisation.incremental import IncrementalGraph
 from objreg_ros.data.checked import Array
 
+LEAST_HELD = 1e-6  # of an error, by all but the closures that are less: below it a quotient would be of rounding
+
 
 class Influence:
     """Of closures on each other, by their ``numbers``, in a solved graph.
@@ -18,11 +20,35 @@ class Influence:
     One pass over the graph finds all of it: that of forty nodes takes no more than twice as long as that of two.
     """
 
-    def __init__(self, graph: IncrementalGraph, poses: Array, closures: Edges, numbers: Sequence[int]) -> None:
-        edges = closures.taken(np.array(numbers, int))
+    def __init__(self, numbers: Sequence[int], errors: Array, covariance: Array) -> None:
         self._at = {number: place for place, number in enumerate(numbers)}
-        self._errors = whitened_errors(poses, edges)
-        self._covariance = graph.error_covariance(edges)
+        self._errors, self._covariance = errors, covariance
+
+    @classmethod
+    def of(cls, graph: IncrementalGraph, poses: Array, closures: Edges, numbers: Sequence[int]) -> Influence:
+        """In a graph with its nodes at ``poses (n, 4, 4)``."""
+        edges = closures.taken(np.array(numbers, int))
+        return cls(numbers, whitened_errors(poses, edges), graph.error_covariance(edges))
+
+    def changed(self, poses: Array, closures: Edges, into: Sequence[int], out: Sequence[int]) -> Influence | None:
+        """That in a graph with some closures more and some less, solved with its nodes at ``poses``.
+
+        Its covariance is ``P - P J^T (S + J P J^T)^-1 J P`` with S of 1 for those more and -1 for those less. None where
+        one of them is not known here, or where those less alone hold something, so that little is left to divide by.
+        """
+        if not self.knows([*into, *out]):
+            return None
+        g, rows, M = self._rows(out), self._rows([*into, *out]), self._covariance
+        if len(g) and np.linalg.eigvalsh(np.eye(len(g)) - M[np.ix_(g, g)])[0] < LEAST_HELD:
+            return None
+        signs = np.repeat([1.0, -1.0], [6 * len(into), 6 * len(out)])
+        gain = np.linalg.solve(np.diag(signs) + M[np.ix_(rows, rows)], M[rows])
+        errors = whitened_errors(poses, closures.taken(np.array([*self._at], int)))
+        return Influence([*self._at], errors, M - M[:, rows] @ gain)
+
+    def knows(self, numbers: Sequence[int]) -> bool:
+        """Whether it is of all of these closures."""
+        return all(number in self._at for number in numbers)
 
     def expected_cost(self, number: int, gone: Sequence[int] = ()) -> float:
         """What it is expected to cost to believe a closure that is not in the graph, without those that are ``gone``.

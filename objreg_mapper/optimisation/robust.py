@@ -25,6 +25,8 @@ from objreg_ros.geometry import inverses
 ROUNDS = 5  # most times that closures go in and out until none wants to
 LINEAR = 10.0  # a closure that is expected to cost so many limits is not tried: it is not for want of linearity
 MOST_DOUBTED, MOST_ALIKE, MOST_RETRIED = 5, 5, 5
+LIKELY_RETRIED = 20  # closures that may be among those once some are left out: to know of them at once is cheap
+MORE = 0.1  # limits: by how much more must be expected of a trial that has failed, to do it again
 NEAR_M = 10.0  # between the ends of two closures that may agree,
 AGREEING_M, AGREEING_SHARE = 0.1, 0.05  # and how far they may be from that, with every metre between them
 
@@ -42,6 +44,13 @@ class _State:
     @property
     def kept(self) -> Array:
         return self.factors >= 0
+
+
+class _Known(NamedTuple):
+    """The influence of closures on each other in a state, and which were ``kept (m,)`` in that."""
+
+    influence: Influence
+    kept: Array
 
 
 class Belief(NamedTuple):
@@ -72,6 +81,7 @@ class RobustGraph:
         self._step_factors = np.zeros(0, int)
         self._withdrawn: tuple[int, ...] = ()  # closures
         self._expected = np.zeros(0)  # what each closure was expected to cost when it came
+        self._failed: dict[tuple[int, ...], float] = {}  # what was expected of leaving closures out, in vain
         graph = IncrementalGraph.begun(T_map_first)
         self._state = _State(graph, np.zeros(0, int), graph.poses(), np.zeros(0), 0.0)
 
@@ -201,7 +211,16 @@ class RobustGraph:
         return cost if cost <= self.limit else self._influence(state, [number]).expected_cost(number)
 
     def _influence(self, state: _State, numbers: Sequence[int]) -> Influence:
-        return Influence(state.graph, state.poses, self.closures, numbers)
+        return Influence.of(state.graph, state.poses, self.closures, numbers)
+
+    def _influence_in(self, state: _State, numbers: Sequence[int], known: _Known | None) -> Influence:
+        """That in a state, from what is known of another one if that is enough."""
+        if known is not None and known.influence.knows(numbers):
+            into, out = state.kept & ~known.kept, ~state.kept & known.kept
+            changed = np.flatnonzero(into).tolist(), np.flatnonzero(out).tolist()
+            if found := known.influence.changed(state.poses, self.closures, *changed):
+                return found
+        return self._influence(state, numbers)
 
     def _is_agreed(self, number: int) -> bool:
         """Whether another closure that is left out says the same."""
@@ -229,31 +248,41 @@ class RobustGraph:
         voters = np.setdiff1d(left_out[self._saying_the_same(newest)[left_out]], self._withdrawn)[:MOST_ALIKE].tolist()
         suspects = kept[np.argsort(-self._expected[kept])][:MOST_DOUBTED].tolist()
         groups = [[k, *np.flatnonzero(self._saying_the_same(k) & self.kept)[:MOST_ALIKE].tolist()] for k in suspects]
-        influence = self._influence(self._state, np.unique([newest, *voters, *chain(*groups)]).tolist())
+        likely = left_out[np.argsort(self.residuals[left_out])][:LIKELY_RETRIED].tolist()
+        numbers = np.unique([newest, *voters, *likely, *chain(*groups)]).tolist()
+        known = _Known(self._influence(self._state, numbers), self.kept)
         for gone in chain(*(([group[0]], group) for group in groups)):
-            gains = [max(self.limit - influence.expected_cost(k, gone), 0.0) for k in (newest, *voters)]
-            if influence.relief(gone) + sum(gains) > self.limit * len(gone) and self.kept[gone].all():
-                self._leave_out(gone)
+            gains = [max(self.limit - known.influence.expected_cost(k, gone), 0.0) for k in (newest, *voters)]
+            gain = known.influence.relief(gone) + sum(gains) - self.limit * len(gone)
+            if gain > self._needed(gone) and self.kept[gone].all():
+                self._leave_out(gone, known)
+                if self.kept[gone].all():
+                    self._failed[tuple(gone)] = gain
                 if self.kept[newest]:
                     return
 
-    def _leave_out(self, numbers: list[int]) -> None:
+    def _needed(self, gone: list[int]) -> float:
+        """What must be expected of leaving closures out: more than when that was in vain."""
+        failed = self._failed.get(tuple(gone))
+        return 0.0 if failed is None else failed + MORE * self.limit
+
+    def _leave_out(self, numbers: list[int], known: _Known) -> None:
         """Where all else is better then."""
         without = self._sorted_out(self._changed(self._state, [], numbers), stays_out=numbers)
         self._take(without)
-        self._take(self._tried_again(without, numbers))
+        self._take(self._tried_again(without, numbers, known))
 
-    def _tried_again(self, state: _State, stays_out: Sequence[int]) -> _State:
+    def _tried_again(self, state: _State, stays_out: Sequence[int], known: _Known | None = None) -> _State:
         """With a closure back in that fits a map which some less hold; others follow it by themselves."""
         left_out = np.setdiff1d(np.flatnonzero(~state.kept), [*stays_out, *self._withdrawn])
         again = left_out[np.argsort(state.residuals[left_out])][:MOST_RETRIED].tolist()
         if not again:
             return state
-        influence = self._influence(state, again)
+        influence = self._influence_in(state, again, known)
         for k in again:
             if not state.kept[k] and influence.expected_cost(k) <= self.limit:
                 state = self._sorted_out(self._changed(state, [k], []), stays_out=stays_out)
-                influence = self._influence(state, again)
+                influence = self._influence_in(state, again, known)
         return state
 
     def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: Sequence[int] = ()) -> _State:
