@@ -33,8 +33,8 @@ class Influence:
     def changed(self, poses: Array, closures: Edges, into: Sequence[int], out: Sequence[int]) -> Influence | None:
         """That in a graph with some closures more and some less, solved with its nodes at ``poses``.
 
-        Its covariance is ``P - P J^T (S + J P J^T)^-1 J P`` with S of 1 for those more and -1 for those less. None where
-        one of them is not known here, or where those less alone hold something, so that little is left to divide by.
+        Its covariance is ``P - P J^T (S + J P J^T)^-1 J P`` with S of 1 for those more and -1 for those less. None
+        where one of them is not known here, or where those less alone hold something: that leaves little to divide by.
         """
         if not self.knows([*into, *out]):
             return None

@@ -131,3 +131,16 @@ def test_where_gtsam_is_not_installed_the_error_says_how_to_get_it(monkeypatch: 
     monkeypatch.setitem(sys.modules, "gtsam", None)
     with pytest.raises(ValueError, match="expected gtsam, which solves the map, got none: pip install"):
         load()
+
+
+def test_what_is_known_of_many_edges_is_what_is_known_of_each() -> None:
+    graph = row()
+    gone = graph.add_edges(edge(0, 5, translation(5.0)))
+    graph.add_edges(edge(1, 4, translation(3.0)))
+    graph.solve_poses()
+    graph.remove(gone)
+    asked = [edge(0, 3, translation(3.0)), edge(2, 5, translation(3.0)), edge(1, 4, translation(3.0))]
+    known = graph.error_covariance(asked[2].joined(asked[0]).joined(asked[1]))
+    for at, one in enumerate((asked[2], asked[0], asked[1])):
+        part = slice(6 * at, 6 * at + 6)
+        np.testing.assert_allclose(known[part, part], graph.error_covariance(one), atol=1e-9)

@@ -74,10 +74,10 @@ def test_what_changes_is_known_without_another_look_at_the_graph(into: list[int]
     graph, poses = solved(closures[:3])
     before = Influence.of(graph, poses, joined(closures), list(range(5)))
     other, there = solved([closures[k] for k in sorted({0, 1, 2, *into} - {*out})])
-    told = before.changed(there, joined(closures), into, out)
-    assert told is not None
+    found = before.changed(there, joined(closures), into, out)
+    assert found is not None
     known = Influence.of(other, there, joined(closures), [4])
-    assert told.expected_cost(4) == pytest.approx(known.expected_cost(4), rel=1e-3)
+    assert found.expected_cost(4) == pytest.approx(known.expected_cost(4), rel=1e-3)
 
 
 def test_what_is_not_known_is_not_guessed() -> None:

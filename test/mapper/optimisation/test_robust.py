@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from objreg_mapper.constraint import Constraint
 from objreg_mapper.optimisation.edges import Edges, edges_of, squared_residuals
 from objreg_mapper.optimisation.incremental import IncrementalGraph
+from objreg_mapper.optimisation.influence import Influence
 from objreg_mapper.optimisation.robust import RobustGraph
 from objreg_ros.data.checked import Array
 from objreg_ros.geometry import pose, rotation_from_vector
@@ -111,6 +113,26 @@ def test_what_one_closure_cannot_turn_two_that_agree_are_looked_at_for() -> None
     graph = closed([right(*ends) for ends in RIGHT] + [lie(0, 10, 30.0), lie(1, 9, 30.0), lie(1, 9, 35.0)])
     assert not graph.kept[5:].any()
     assert [graph._is_agreed(k) for k in (5, 6, 7)] == [True, True, False]
+
+
+def test_what_was_left_out_in_vain_is_left_out_again_only_if_more_is_expected(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = list[tuple[int, ...]]()
+    leave_out = RobustGraph._leave_out
+
+    def counted(graph: RobustGraph, numbers: list[int], known: Any) -> None:
+        tried.append(tuple(numbers))
+        leave_out(graph, numbers, known)
+
+    monkeypatch.setattr(RobustGraph, "_leave_out", counted)
+    graph = closed([right(*ends) for ends in RIGHT])
+    monkeypatch.setattr(Influence, "relief", lambda influence, gone: 1.5 * LIMIT * len(gone))
+    for k in range(3):
+        graph.close(lie(0, 10, 30.0 + 20.0 * k))
+    assert tried and len(set(tried)) == len(tried)
+    monkeypatch.setattr(Influence, "relief", lambda influence, gone: 3.0 * LIMIT * len(gone))
+    graph.close(lie(0, 10, 100.0))
+    assert len(set(tried)) < len(tried)
+    assert graph.kept.tolist() == [True] * 5 + [False] * 4
 
 
 def test_the_expected_cost_is_the_rise_of_the_cost() -> None:
