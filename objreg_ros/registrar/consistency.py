@@ -28,18 +28,21 @@ MOST = 512  # statements that are kept, the newest
 
 
 class Standpoint(NamedTuple):
-    """Where a keyframe was: ``T_session_camera (4, 4)``, ``travelled`` m in its session."""
+    """Where a keyframe of ``robot`` was: ``T_session_camera (4, 4)``, ``travelled`` m in its session."""
 
     stamp_ns: int
     session: int
     T_session_camera: Array
     travelled: float
+    robot: str = ""
 
     @classmethod
     def of(cls, keyframe: Keyframe) -> Standpoint:
         """Of a keyframe."""
         T = keyframe.T_odom_camera
-        return cls(keyframe.stamp_ns, keyframe.session, np.eye(4) if T is None else T, keyframe.travelled)
+        return cls(
+            keyframe.stamp_ns, keyframe.session, np.eye(4) if T is None else T, keyframe.travelled, keyframe.robot
+        )
 
 
 class Statement(NamedTuple):

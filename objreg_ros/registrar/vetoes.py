@@ -4,6 +4,7 @@
 A pair of keyframes says again what a veto withdrew where it is that pair, whatever its pose; and where it is of the
 same two revisits and its pose agrees, carried by odometry as in `consistency`: over `REACH_M` of path at both ends
 together, within the tolerance for so much path. Another pose of the same place is none of these: it may be right.
+A keyframe that another registrar stores has another session after each start: it is known by its robot and stamp.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from objreg_ros.registration.gate.refusal import Refusal
 
 Identity = tuple[object, ...]
 Ends = tuple[int, int]  # the sessions of target and source
+Moment = tuple[int, int]  # session and stamp
 
 VETOED: Refusal = Reason.VETOED, "a person withdrew this constraint, or a neighbouring one whose pose agrees"
 
@@ -38,6 +40,7 @@ class Vetoes:
     def __init__(self, vetoes: Iterable[Veto] = ()) -> None:
         self._known: dict[Identity, Veto] = {}
         self._stated: defaultdict[Ends, dict[Identity, Statement]] = defaultdict(dict)
+        self._beside: defaultdict[Moment, dict[Identity, tuple[str, int]]] = defaultdict(dict)  # robot, stamp
         for veto in vetoes:
             self.add(veto)
 
@@ -57,17 +60,23 @@ class Vetoes:
         statement = _statement(veto)
         if statement is not None:
             self._stated[statement.target.session, statement.source.session][name] = statement
+            for one, other in ((statement.target, statement.source), (statement.source, statement.target)):
+                self._beside[one.session, one.stamp_ns][name] = other.robot, other.stamp_ns
 
     def remove(self, closure: LoopClosure) -> Veto | None:
         """Let a closure hold again; its veto, None where there was none."""
         name = identity_of(closure)
         for stated in self._stated.values():
             stated.pop(name, None)
+        for beside in self._beside.values():
+            beside.pop(name, None)
         return self._known.pop(name, None)
 
     def covers(self, source: Standpoint, target: Standpoint, T_target_source: Array) -> bool:
         """Whether a pose (4, 4) between keyframes at these standpoints is withdrawn."""
         there, here = target.session, source.session
+        if self._names(target, source) or self._names(source, target):
+            return True
         return self._say(here, there, Statement(source, target, T_target_source, 0.0, False)) or (
             here != there and self._say(there, here, Statement(target, source, inverse(T_target_source), 0.0, False))
         )
@@ -75,6 +84,11 @@ class Vetoes:
     def cover_waiting(self, waiting: WaitingClosure) -> bool:
         """As `covers`, for what waits for others to confirm it."""
         return self.covers(waiting.here, waiting.there, waiting.closure.T_from_to)
+
+    def _names(self, one: Standpoint, other: Standpoint) -> bool:
+        """Whether a pair is withdrawn whose other keyframe is known by its robot and stamp, whatever its session."""
+        beside = self._beside.get((one.session, one.stamp_ns), {})
+        return bool(other.robot) and (other.robot, other.stamp_ns) in beside.values()
 
     def _say(self, source_session: int, target_session: int, asked: Statement) -> bool:
         stated = list(self._stated.get((target_session, source_session), {}).values())
@@ -91,15 +105,15 @@ def _statement(veto: Veto) -> Statement | None:
     closure = veto.closure
     if closure.from_session is None or closure.to_session is None:
         return None
-    target = _standpoint(closure.from_ns, closure.from_session, veto.stands[0])
-    source = _standpoint(closure.to_ns, closure.to_session, veto.stands[1])
+    target = _standpoint(closure.from_ns, closure.from_session, veto.stands[0], closure.from_robot)
+    source = _standpoint(closure.to_ns, closure.to_session, veto.stands[1], closure.to_robot)
     return Statement(source, target, closure.T_from_to, 0.0, False)
 
 
-def _standpoint(stamp_ns: int, session: int, stand: Stand | None) -> Standpoint:
+def _standpoint(stamp_ns: int, session: int, stand: Stand | None, robot: str) -> Standpoint:
     """Beyond the reach of any path where it is not known where the keyframe was."""
     known = stand or Stand(np.eye(4), np.nan)
-    return Standpoint(stamp_ns, session, known.T_session_camera, known.travelled)
+    return Standpoint(stamp_ns, session, known.T_session_camera, known.travelled, robot)
 
 
 def _same_pair(one: Statement, other: Statement) -> bool:

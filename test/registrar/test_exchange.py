@@ -14,6 +14,7 @@ from registration import rooms
 from registration.samples import SECOND, candidate
 
 from objreg_ros.data.checked import Array
+from objreg_ros.data.closure_id import closure_id
 from objreg_ros.data.closures import LoopClosure, Reason
 from objreg_ros.data.frames import Frame
 from objreg_ros.geometry import inverse, pose_error
@@ -159,6 +160,23 @@ def test_a_session_of_another_that_a_stored_closure_names_keeps_its_number_to_it
     again = Registrar(params)
     assert again.take_session() not in (closure.from_session, closure.to_session)
     again.close()
+
+
+def test_what_was_withdrawn_of_another_robot_stays_so_after_a_restart(tmp_path: Path) -> None:
+    params = PARAMS.replaced(store=str(tmp_path / "a.db"))
+    a, b = Robot("a", params), Robot("b")
+    a.sees(10, HERE)
+    summary = b.sees(30, BESIDE)
+    (closure,) = a.fetches(summary, b).closures  # type: ignore[union-attr]
+    name = closure_id(closure)
+    a.registrar.veto([name])
+    a.registrar.close()
+    again = Robot("a", params, run="a, once more")
+    outcome = again.fetches(summary, b)  # its session has another number now
+    assert outcome is not None and not outcome.closures
+    assert [refusal.reason for refusal in outcome.rejected] == [Reason.VETOED]
+    assert again.registrar.undo_veto([name]).closures
+    again.registrar.close()
 
 
 def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays(monkeypatch: pytest.MonkeyPatch) -> None:
