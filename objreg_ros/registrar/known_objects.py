@@ -67,9 +67,10 @@ def objects_called(
 def _placed(
     known: Landmark, sightings: Iterable[Sighting], session: int | None, relocalised: Relocalised | None
 ) -> KnownObject:
-    own = [sighting for sighting in sightings if sighting.session == known.session]
-    xyz = np.array([sighting.position for sighting in own]).reshape(-1, 3)
-    extents = np.array([sighting.extent for sighting in own])
+    stored = list(sightings)
+    own = [sighting for sighting in stored if sighting.session == known.session]
+    xyz = np.array([sighting.position for sighting in own] or [known.position])
+    extents = np.array([sighting.extent for sighting in own or stored[-1:]])  # those of its session may be forgotten
     position, covariance = position_of(xyz, extents)
     if known.session != session and relocalised is not None:
         position, covariance = _brought_here(position, covariance, relocalised)

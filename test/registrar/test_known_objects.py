@@ -72,6 +72,14 @@ def test_an_object_of_the_map_that_the_camera_is_in_is_brought_here_less_sure_th
     assert across == pytest.approx((2.0 * TURN_SIGMA) ** 2) and along == pytest.approx(0.0, abs=1e-12)
 
 
+def test_an_object_whose_sightings_of_its_session_are_forgotten_is_where_it_was_seen_last() -> None:
+    earlier = lambda number: [one for one in sightings_of(number) if one.session != SEEN[number][0]]  # noqa: E731
+    chairs = objects_called("chair", LANDMARKS, earlier, 2, RELOCALISED).objects
+    np.testing.assert_allclose(chairs[1].xyz, (1.0, 0.0, 0.0))
+    np.testing.assert_allclose(chairs[0].xyz, transform(inverse(T_MAP_ODOM), np.array([7.0, 0.0, 0.0])), atol=1e-12)
+    assert [item.extent for item in chairs] == [1.0, 1.0]
+
+
 def test_a_label_that_is_not_there_is_answered_with_those_that_are() -> None:
     found = objects_called("sofa", LANDMARKS, sightings_of, 2, None)
     assert not found.objects and found.message == "no sofa is known; there are: chair (2), Chair (1)"
