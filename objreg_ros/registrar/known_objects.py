@@ -57,7 +57,8 @@ def objects_called(
     Each by those of its sightings (``sightings_of`` its number) that are of the session that saw it last. Left out and
     counted are those of sessions that are neither this one nor that of ``relocalised``: where they are is not known.
     """
-    named = [known for known in landmarks if not label or known.label.casefold() == label.casefold()]
+    wanted = label.casefold()
+    named = [known for known in landmarks if not label or known.label.casefold() == wanted]
     tied = [k for k in named if k.session == session or (relocalised is not None and k.session == relocalised.session)]
     latest = sorted(tied, key=lambda known: (-known.stamp_ns, known.landmark))[:MOST_OBJECTS]
     objects = tuple(_placed(known, sightings_of(known.landmark), session, relocalised) for known in latest)

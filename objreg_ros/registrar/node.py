@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from objreg_ros.bridge.messages import known_objects_msg
+from objreg_ros.bridge.messages import headers, known_objects_msg
 from objreg_ros.bridge.messages.localisation_msg import summary_of
 from objreg_ros.bridge.messages.markers import MarkerScene
 from objreg_ros.bridge.node.node_base import DroppedError
@@ -286,7 +286,8 @@ class RegistrarNode(FramesNode):
             return response
         self._asking += 1
         try:
-            found = await self.aside(lambda: self._registrar.where(request.label))
+            label = headers.bounded(request.label, "label")
+            found = await self.aside(lambda: self._registrar.where(label))
         except (ValueError, OSError) as error:
             response.message = str(error)
             return response

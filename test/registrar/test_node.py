@@ -396,3 +396,12 @@ def test_where_is_answered_by_a_thread_and_refused_where_too_many_ask(make: Maki
     with pytest.raises(StopIteration) as refused:
         node._where(SimpleNamespace(label="cup"), SimpleNamespace(success=False)).send(None)
     assert refused.value.value.message.startswith("~/where: call again: 16 earlier calls")
+
+
+def test_a_label_that_no_object_can_have_is_refused_before_the_registrar_is_asked(make: Making) -> None:
+    node = make()
+    with pytest.raises(StopIteration) as refused:
+        node._where(SimpleNamespace(label="c" * 10_000), SimpleNamespace(success=False)).send(None)
+    answer = refused.value.value
+    assert not answer.success and node._asking == 0
+    assert answer.message.startswith("label: expected at most 1000 characters, got 10000") and len(answer.message) < 200
