@@ -34,6 +34,8 @@ def command(store: Path, first: int, second: int) -> None:
     Its pose is the best that registration finds of the two; where that finds none, nothing is written. Its evidence
     says `by hand`. What was withdrawn stays withdrawn: see `objreg veto --undo`. No registrar may hold STORE meanwhile.
     """
+    if first == second:
+        raise ValueError(f"expected two keyframes, got the one at {first} ns twice")
     require_place(store, read_only=True)
     with closing(Store(store)) as opened:
         target, source = sorted((_at(opened, first), _at(opened, second)), key=lambda one: one.keyframe_id)

@@ -56,6 +56,8 @@ def test_what_nobody_closed_is_closed_by_hand(tmp_path: Path) -> None:
     with closing(Registrar(PARAMS.replaced(store=str(place), least_odds=1e6, confirm_seconds=0.0))) as registrar:
         closures, _ = _run(registrar, _frame(0, HERE, True), _frame(1, AWAY, True), _frame(30, BESIDE, True))
         assert closures == []
+    with pytest.raises(ValueError, match="expected two keyframes, got the one at 30000000000 ns twice"):
+        accept(place, 30 * SECOND, 30 * SECOND)
     accept(place, 0, 30 * SECOND)
     with closing(Store(place, read_only=True)) as opened:
         (closure,) = opened.closures()
