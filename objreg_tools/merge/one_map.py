@@ -27,6 +27,7 @@ from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 from objreg_tools.truth import LOOSE, Truths, within
 
 STEP_NS = 500_000_000  # at most, between two poses of odometry: the mapper takes a second without one for a gap
+LONGEST_NS = 600_000_000_000  # between two keyframes: a longer silence, as of a clock that was set, stays a gap
 
 
 class Placed(NamedTuple):
@@ -161,6 +162,9 @@ def odometry_of(track: Track) -> Iterator[tuple[int, Array]]:
     """Stamps and poses (4, 4) of a session's keyframes, with as many between them as the mapper needs."""
     yield track.keyframes[0][:2]
     for one, other in pairwise(track.keyframes):
+        if other.stamp_ns - one.stamp_ns > LONGEST_NS:
+            yield other[:2]
+            continue
         out = np.zeros(3) if other.travelled <= one.travelled else _detour(one, other)
         steps = 2 * max(1, -(-(other.stamp_ns - one.stamp_ns) // (2 * STEP_NS)))
         for k in range(1, steps if other.stamp_ns - one.stamp_ns > steps else 1):

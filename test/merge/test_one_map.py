@@ -58,6 +58,17 @@ def test_sessions_that_are_tied_are_in_the_frame_of_the_first() -> None:
     assert maps[0].kept == 3 and maps[0].contradictions == ()
 
 
+def test_a_clock_that_was_set_in_a_session_leaves_a_gap_and_costs_nothing() -> None:
+    one, other, closures = pair()
+    late = [keyframe._replace(stamp_ns=keyframe.stamp_ns + 10**18) for keyframe in one.keyframes[2:]]
+    leapt = replace(one, keyframes=[*one.keyframes[:2], *late])
+    assert len(list(odometry_of(leapt))) == len(list(odometry_of(one))) - 19
+    tie = closing(leapt, 3, other, 3, 0.0)
+    (found,) = one_maps([leapt, other], [*closures[:2], tie])
+    assert found.kept == 3 and found.contradictions == ()
+    assert at([found], leapt, 3) == pytest.approx(3.0, abs=0.05)
+
+
 def test_a_closure_that_all_others_contradict_is_listed_with_how_far_it_is_off() -> None:
     one, other, closures = pair()
     more = [closing(one, 2, other, 2, 0.0), closing(other, 0, other, 3, 3.0)]
