@@ -14,7 +14,7 @@ SPARE = 2  # times the seconds of a file are kept: one begins where a keyframe d
 BEFORE_NS = 1_000_000_000  # of odometry, IMU and transforms before the first picture: a pose is between two
 EARLIER_NS = 200_000_000  # colour may be stamped so long before the depth that it belongs to
 OVERHEAD = 200  # bytes of what is around each message
-MOST_EARLY = 1000  # small messages that wait for the first stamp
+MOST_EARLY = 1000  # messages that wait for the first stamp
 KEPT_BYTES = 16_000_000  # most of the messages of a topic that stay however old they are
 
 
@@ -59,7 +59,8 @@ class Recent:
         self._messages: deque[Kept] = deque()
         self._latched: dict[str, deque[Kept]] = {}
         self._keyframes: deque[int] = deque()
-        self._early: deque[tuple[Source, bytes, int | None]] = deque(maxlen=MOST_EARLY)  # before the first stamp
+        self._early: deque[tuple[Source, bytes, int | None]] = deque()  # before the first stamp
+        self._early_nbytes = 0
         self.nbytes = 0
         self.clock_ns: int | None = None
         self.jumps = 0
@@ -77,11 +78,19 @@ class Recent:
         if leads and stamp_ns is not None:
             self._go_to(stamp_ns)
         if self.clock_ns is None:
-            self._early.append((source, cdr, stamp_ns))
+            self._wait(source, cdr, stamp_ns)
             return
         while self._early:
             self._take(*self._early.popleft())
+        self._early_nbytes = 0
         self._take(source, cdr, stamp_ns)
+
+    def _wait(self, source: Source, cdr: bytes, stamp_ns: int | None) -> None:
+        """Keep a message until there is a stamp; pictures without any may come for ever."""
+        self._early.append((source, cdr, stamp_ns))
+        self._early_nbytes += len(cdr) + OVERHEAD
+        while self._early and (len(self._early) > MOST_EARLY or self._early_nbytes > self._most_bytes):
+            self._early_nbytes -= len(self._early.popleft()[1]) + OVERHEAD
 
     def _take(self, source: Source, cdr: bytes, stamp_ns: int | None) -> None:
         assert self.clock_ns is not None

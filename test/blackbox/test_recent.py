@@ -44,6 +44,15 @@ def test_the_bytes_are_bounded_and_the_oldest_go() -> None:
     assert depth_stamps(recent) == [float(k) for k in range(41, 51)]
 
 
+def test_the_bytes_of_what_waits_for_a_first_stamp_are_bounded_too() -> None:
+    recent = Recent(1000.0, 10 * (1000 + OVERHEAD))
+    for k in range(50):
+        recent.add(IMAGE, bytes([k]) * 1000, None)
+    assert sum(len(cdr) + OVERHEAD for _, cdr, _ in recent._early) == 10 * (1000 + OVERHEAD)
+    recent.add(ODOM, b"", S, leads=True)
+    assert [kept.cdr[0] for kept in recent.snapshot() if kept.source is IMAGE] == list(range(41, 50))
+
+
 def test_a_file_begins_with_the_last_keyframe_that_began_before_its_seconds() -> None:
     recent = filled(2.0)
     for stamp in (106.5, 107.2, 108.5):
