@@ -13,8 +13,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.veto import Veto
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.vetoes import identity_of
 from objreg_tools.merge.sources import Source, Sources, open_sources
 from objreg_tools.merge.ties import Leg, Tying, legs_of
 from objreg_tools.merge.unfinished import Unfinished
@@ -77,7 +80,21 @@ class _Merging:
             kept = (closure for source in self._sources for closure in self._sources.closures(source))
             self._write({"kept": closures}, closures, lambda: self._store.add_closures((one, {}) for one in kept))
         if not self._store.vetoes():
-            self._store.veto([veto for source in self._sources for veto in self._sources.vetoes(source)])
+            self._store.veto(self._vetoes())
+
+    def _vetoes(self) -> list[Veto]:
+        """What was withdrawn in any store, once, and what others hold of the same two keyframes, whichever came first.
+
+        Where two robots exchange keyframes, the registrars of both may have closed and stored a pair.
+        """
+        withdrawn = {identity_of(veto.closure): veto for of in map(self._sources.vetoes, self._sources) for veto in of}
+        pairs = {_ends(veto.closure) for veto in withdrawn.values()}
+        for one in self._store.closures() if pairs else ():
+            if _ends(one) in pairs:
+                ends = (one.from_session, one.from_ns), (one.to_session, one.to_ns)
+                stands = self._store.stand_at(*ends[0]), self._store.stand_at(*ends[1])
+                withdrawn.setdefault(identity_of(one), Veto(closure=one, stands=stands))
+        return list(withdrawn.values())
 
     def _copy_keyframe(self, source: Source, number: int, merged: int) -> None:
         try:
@@ -112,6 +129,11 @@ class _Merging:
     def _count(self, keyframes: int) -> None:
         self._done += keyframes
         self._report(self._done, self._total)
+
+
+def _ends(closure: LoopClosure) -> frozenset[tuple[int | None, int]]:
+    """The sessions and stamps of both keyframes."""
+    return frozenset({(closure.from_session, closure.from_ns), (closure.to_session, closure.to_ns)})
 
 
 def _about(source: Source) -> dict[str, Any]:

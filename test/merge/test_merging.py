@@ -12,6 +12,7 @@ from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.memory.codec import scene_row
 from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.veto import Veto
 from objreg_ros.registrar.registrar import Registrar
 from objreg_tools.merge.merging import Merged, merge
 from objreg_tools.merge.ties import Tying
@@ -70,6 +71,30 @@ def test_what_was_withdrawn_in_a_store_stays_so_and_comes_back_with_undo(tmp_pat
     (again,) = registrar.undo_veto([closure_id(vetoed)]).closures
     registrar.close()
     assert ends(again) == ends(gone) and ends(again) in map(ends, closures(both))
+
+
+@pytest.mark.parametrize("by_both", [False, True])
+def test_what_one_store_withdrew_of_a_pair_that_two_have_holds_in_neither(by_both: bool, tmp_path: Path) -> None:
+    paths = two_stores(tmp_path, robots=("a", "b"))
+    known = {"T_from_to": np.eye(4), "covariance": np.eye(6), "labels": ("cup",)}
+    a, b = ({f"{end}_robot": "a", f"{end}_ns": 0, f"{end}_session": of} for end, of in (("from", 0), ("to", 1)))
+    a |= {"to_robot": "b", "to_ns": 30_000_000_000, "to_session": 1}
+    b |= {"from_robot": "b", "from_ns": 30_000_000_000, "from_session": 0}
+    same = a | {"from_session": 1, "to_session": 0}  # what b withdrew, as a has it
+    for path, of, gone in ((paths[0], a, True), (paths[1], same if by_both else b, by_both)):
+        store = Store(path)
+        store.add_closure(LoopClosure(**known, **of), {})
+        if gone:
+            store.veto([Veto(closure=LoopClosure(**known, **of))])
+        store.close()
+    both = merge(paths, tmp_path / "both.db", PARAMS).path
+    pair = {0, 30_000_000_000}
+    assert pair not in [{one.from_ns, one.to_ns} for one in closures(both)]
+    registrar = Registrar(PARAMS.replaced(store=str(both)))
+    ids = [closure_id(one) for one in registrar.vetoed]
+    assert len(registrar.undo_veto(ids).closures) == len(ids) == registrar.counts()["vetoed"] + (1 if by_both else 2)
+    registrar.close()
+    assert [{one.from_ns, one.to_ns} for one in closures(both)].count(pair) == len(ids)
 
 
 def test_closures_of_each_store_are_kept(merged: Merged, folder: Path) -> None:
