@@ -13,6 +13,7 @@ from objreg_tools.cli.watching.local_pages import Answer
 
 OPEN_METRICS = "application/openmetrics-text"
 TEXT = 300  # characters of a label that another node gave
+LARGEST = 2**63  # a counter has 64 bits
 
 
 class Exposition:
@@ -42,7 +43,11 @@ class Exposition:
     def _made(self, family: Family, nodes: dict[str, Observation]) -> Any:
         kind = self._core.CounterMetricFamily if family.is_counter else self._core.GaugeMetricFamily
         made = kind(family.name, family.doc, labels=("node", *family.labels), unit=family.unit)
+        samples = dict[tuple[str, ...], float]()  # two of the same labels would have Prometheus refuse all
         for name, node in nodes.items():
             for labels, number in family.of(node):
-                made.add_metric([label[:TEXT] for label in (name, *labels)], float(number))
+                if abs(number) <= LARGEST:  # not that of a node that reports nonsense
+                    samples.setdefault(tuple(label[:TEXT] for label in (name, *labels)), float(number))
+        for labels, number in samples.items():
+            made.add_metric(labels, number)
         return made

@@ -86,3 +86,15 @@ def test_without_the_client_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setitem(sys.modules, "prometheus_client", None)
     with pytest.raises(ValueError, match=r"objreg metrics: expected prometheus_client, got none; .*\[metrics\]"):
         Exposition(Observed())
+
+
+def test_nonsense_of_one_node_leaves_the_others_as_they_are(observed: Observed) -> None:
+    before = text(observed).splitlines()
+    long = {"x" * 300 + end: 1 for end in "ab"}  # the same once they are cut
+    observed.report("/mad", NodeReport(Balance(10**400, 6, 1, long, {}, {"total": (float("nan"), 1.0)}), False, ""))
+    after = text(observed).splitlines()
+    mad = [line for line in after if 'node="/mad"' in line]
+    assert len([line for line in mad if "dropped_total{" in line]) == 1
+    assert not [line for line in mad if "received_total{" in line or "p50_seconds{" in line]
+    stays = [line for line in before if 'node="/detector"' in line]
+    assert stays and set(stays) <= set(after)
