@@ -40,6 +40,15 @@ def test_walls_are_where_they_are(flat: OccupancyGrid) -> None:
     assert flat.cells.shape == (pytest.approx(6.0 / 0.05, abs=4), pytest.approx(4.0 / 0.05, abs=4))
 
 
+@pytest.mark.parametrize("times", range(1, 40))
+def test_what_is_as_likely_free_as_occupied_is_unknown(times: int) -> None:
+    maker = GridMaker(np.zeros((1, 3)), 0.0, GridParams())
+    maker._hits[:], maker._passes[:] = 8 * times, 17 * times
+    maker._passes[0, 0], maker._hits[1, 1, 0] = 17 * times + 1, 8 * times + 1
+    cells = maker.grid().cells
+    assert cells.shape == (2, 2) and cells.tolist() == [[FREE, UNKNOWN], [UNKNOWN, OCCUPIED]]
+
+
 def test_the_opening_between_two_rooms_is_free(flat: OccupancyGrid) -> None:
     xs, ys = np.meshgrid(np.arange(1.1, 1.9, 0.05), np.arange(2.5, 3.6, 0.05))
     assert (values(flat, xs.ravel(), ys.ravel()) == FREE).all()
