@@ -34,7 +34,7 @@ import cv2
 import numpy as np
 from closure import plans, simulated
 from command_line import quick_values
-from relocalisation import NEAR_M, Earlier, begun_anew, objects_of, remember
+from sessions import NEAR_M, Earlier, begun_anew, objects_of, remember
 from sources import detector_of, read_source
 
 from objreg_ros.data.checked import Array
