@@ -63,7 +63,7 @@ def assert_same(one: Any, other: Any) -> None:
         a, b = getattr(one, field.name), getattr(other, field.name)
         if isinstance(a, np.ndarray):
             assert np.allclose(a, b, rtol=0, atol=1e-12), field.name
-        elif field.name == "matches":
+        elif field.name == "objects":
             assert [(m.label, m.object_id) for m in a] == [(m.label, m.object_id) for m in b]
         else:
             assert a == b, field.name
