@@ -65,10 +65,10 @@ NODES: dict[str, Access] = {
     + Access(
         writes=(
             *("transforms", "landmarks", *CLOSURES, "closure_refusals", "object_landmarks", "refusals", "acceptances"),
-            *("markers", "relocalised", "initialpose"),
+            *("markers", "relocalised", "initialpose", "localisation_state"),
         ),
         reads=FRAMES,
-        serves=("~/relocalise", "~/where", "~/reset", "~/save", "~/enable"),
+        serves=("~/relocalise", "~/where", "~/veto", "~/reset", "~/save", "~/enable"),
     ),
     "keyframer": MANAGED + Access(writes=("keyframes",), reads=FRAMES),
     "blackbox": MANAGED

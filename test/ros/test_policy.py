@@ -85,10 +85,11 @@ def test_all_that_a_node_opens_is_allowed_and_nothing_is_that_it_never_opens(ope
 
 
 def absent() -> set[str]:
-    """Topics of packages that are not installed here."""
+    """Topics and services of packages that are not installed here."""
     return {
         *(() if is_installed() else TF),
         *(() if vision_to_msg.Detection2DArray else ("detections", "detections_3d")),
         *(() if LoopClosureMsg else ("loop_closures", "r1/loop_closures", "r2/loop_closures")),
-        *(() if LoopClosureMsg else ("closure_refusals", "object_landmarks")),
+        *(() if LoopClosureMsg else ("closure_refusals", "object_landmarks", "localisation_state")),
+        *(() if LoopClosureMsg else ("~/where", "~/veto")),
     }

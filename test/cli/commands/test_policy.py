@@ -26,12 +26,13 @@ OURS = {  # by topic the only nodes that may write it
     "keyframes": {"keyframer"},
     "constraints": {"registrar"},
     "loop_closures": {"registrar"},
+    "localisation_state": {"registrar"},
     "labels": {"detector", "segmenter"},
     "/fleet/summaries": {"registrar"},
     "/fleet/requests": {"registrar"},
     "/fleet/keyframes": {"registrar"},
 }
-COMMANDS = ("reset", "save", "enable", "set_parameters", "set_parameters_atomically", "change_state")
+COMMANDS = ("reset", "save", "enable", "veto", "set_parameters", "set_parameters_atomically", "change_state")
 ROBOT = FILES["config/sros2/robot1.policy.xml"]
 Rules = dict[tuple[str, str], set[str]]  # by verb and full name the enclaves that may
 
