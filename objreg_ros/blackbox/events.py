@@ -6,8 +6,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from objreg_ros.data.localisation import State
+
 CALLED, WEAK, LOST = "called", "weak_odds", "lost"
-LOST_STATES = ("lost", "kidnapped")
+LOST_STATES = (State.LOST.name, State.KIDNAPPED.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +37,7 @@ def of_closure(from_ns: int, to_ns: int, evidence: Mapping[str, float], least_od
 
 def of_state(state: str, before: str, detail: str = "") -> Event | None:
     """The event of a state of localisation that has just become lost; None for any other."""
-    now_lost, was_lost = (text.strip().lower() in LOST_STATES for text in (state, before))
+    now_lost, was_lost = (text.strip().upper() in LOST_STATES for text in (state, before))
     return Event(LOST, f"{state}: {detail}".removesuffix(": ")) if now_lost and not was_lost else None
 
 

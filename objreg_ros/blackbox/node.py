@@ -38,6 +38,7 @@ from objreg_ros.bridge.process.intra_process import IntraProcessBus
 from objreg_ros.bridge.process.other_nodes import ParameterReader
 from objreg_ros.bridge.streams.clock_monitor import ClockMonitor
 from objreg_ros.bridge.streams.player import is_installed, message_type
+from objreg_ros.data.localisation import State
 from objreg_ros.diagnostics import Diagnostics
 from objreg_ros.whole_file import whole_file, write_whole
 
@@ -80,7 +81,6 @@ DECISIONS = {
 }
 SAID = ("refusals", "acceptances")
 STATE = "localisation_state"  # of whatever type its publisher gives it
-STATES = ("TRACKING", "SURE", "UNSURE", "LOST", "KIDNAPPED", "AMBIGUOUS")
 ASKED = ("detector", "segmenter", "registrar")  # whose parameters are in the file
 LOOK_S = 1.0  # between two looks at who publishes what is not always there
 OWN = "blackbox"  # the topic of the JSON
@@ -323,7 +323,7 @@ def state_of(message: Any) -> tuple[str, str]:
     """
     state = getattr(message, "state", getattr(message, "data", None))
     if isinstance(state, int):
-        state = next((name for name in STATES if getattr(type(message), name, None) == state), None)
+        state = next((name for name in State.__members__ if getattr(type(message), name, None) == state), None)
     if not isinstance(state, str):
         raise ValueError(f"{STATE}: expected a state, got {type(message).__name__}")
     return state, str(getattr(message, "reason", ""))

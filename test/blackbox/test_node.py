@@ -19,9 +19,10 @@ from std_msgs.msg import Header, String
 
 from objreg_ros.blackbox.node import DECISIONS, INPUTS, KEPT, BlackboxNode, state_of
 from objreg_ros.blackbox.recent import Part, Source
-from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.messages import localisation_msg, to_msg
 from objreg_ros.bridge.node.diagnostics import refusals
 from objreg_ros.data.closures import Reason, Rejected
+from objreg_ros.data.localisation import LocalisationState, State
 from objreg_tools.recording import open_recording
 
 S = 1_000_000_000
@@ -157,6 +158,31 @@ def test_a_camera_that_becomes_lost_writes_a_file(box: Callable[..., BlackboxNod
         node._on_state(source, String, serialize_message(String(data=state)))
     wait(lambda: node.accounting.balance().published == 1)
     assert [path.name[-9:] for path in (tmp_path / "box").glob("*.mcap")] == ["lost.mcap"]
+
+
+def test_a_registrar_that_says_lost_writes_a_file_with_what_it_said(
+    box: Callable[..., BlackboxNode], tmp_path: Path
+) -> None:
+    kind = localisation_msg.LocalisationStateMsg
+    if kind is None:
+        pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
+    node = box()
+    see(node, 100)
+    source = Source("/localisation_state", "objreg_msgs/msg/LocalisationState", Part.DECISION)
+    for state in (State.SURE, State.AMBIGUOUS, State.LOST, State.KIDNAPPED):
+        now = LocalisationState(
+            stamp_ns=101 * S, state=state, reason="by 3 m", age_s=1.0, odds=0.5, probability=0.4, sigma_m=0.1
+        )
+        node._on_state(source, kind, serialize_message(localisation_msg.localisation_state(now, "eye")))
+        assert node.own_diagnostics()[-1].passed_over == 0, state
+    wait(lambda: node.accounting.balance().published == 1)
+    (path,) = (tmp_path / "box").glob("*.mcap")
+    assert (about(path)["event"], about(path)["detail"]) == ("lost", "LOST: by 3 m")
+    with open_recording(path) as opened:
+        said = [record.message for record in opened.records(["/localisation_state"])]
+    assert [State(one.state) for one in said][:3] == [State.SURE, State.AMBIGUOUS, State.LOST]
+    lost = said[2]
+    assert (lost.header.stamp.sec, lost.header.frame_id, lost.reason, lost.odds) == (101, "eye", "by 3 m", 0.5)
 
 
 def test_a_state_is_text_or_a_constant_of_its_message() -> None:
