@@ -264,6 +264,10 @@ class Landmarks:
         for keyframe_id, view in gone.views.items():
             gone.views[keyframe_id] = merge.R_into_old @ view
         known = self._known.setdefault(new, gone)
+        if max(gone.views) > max(known.views):  # the one that is gone was seen last
+            self._leave(known.last, new)
+            known.last = gone.last
+            self._known[new] = self._known.pop(new)
         self._there[self._cell(known.last)].add(new)
         for keyframe_id in gone.views:
             self._shown[keyframe_id] = array("q", {*self._shown[keyframe_id]} - {old} | {new})

@@ -269,6 +269,21 @@ def test_a_late_closure_joins_the_landmarks_that_it_says_are_one() -> None:
     assert len(landmarks) == 1 and len(views) == 2 and np.allclose(views, views[0])
 
 
+def test_what_a_late_closure_joins_is_where_it_was_seen_last_as_after_a_restart() -> None:
+    landmarks, turn = Landmarks(PARAMS), rotation_from_vector(np.array([0.0, 0.0, 0.5]))
+    first, _ = landmarks.assign(_seen(1, CUP))
+    landmarks.add_sightings(first)
+    second, _ = landmarks.assign(_seen(2, CUP, session=1, x=5.0))
+    landmarks.add_sightings(second)
+    landmarks.add_sightings((), landmarks.joined([(second[0], first[0])], turn))
+    (known,) = landmarks.known()
+    assert (known.landmark, known.session, known.stamp_ns, known.sightings) == (1, 1, second[0].stamp_ns, 2)
+    assert np.array_equal(known.position, second[0].position)
+    (again,) = Landmarks(PARAMS, [first[0], second[0].of_landmark(1, turn)]).known()
+    assert (again.session, again.stamp_ns) == (known.session, known.stamp_ns)
+    assert _take(landmarks, _seen(3, CUP, session=1, x=5.0)) == [1]
+
+
 def test_a_late_closure_joins_no_two_that_a_keyframe_shows_together() -> None:
     landmarks = Landmarks(PARAMS)
     first, _ = landmarks.assign(_seen(1, CUP, BOOK))
