@@ -46,10 +46,10 @@ class Confirmation:
         self._limits, self._wait_ns = limits_of(params), round(1e9 * params.confirm_seconds)
         self._consistency = Consistency()
         self._waiting: dict[int, WaitingClosure] = {}
-        self._contrary: list[tuple[Keyframe, Candidate]] = []  # refused for odometry alone, of the newest keyframe
+        self._contrary: list[tuple[Keyframe, Candidate]] = []  # of the newest keyframe
 
     def take_contrary(self) -> list[tuple[Keyframe, Candidate]]:
-        """The stored keyframes, and poses in them, that only odometry speaks against; since the last call."""
+        """The stored keyframes, and poses in them, that only odometry or neighbours oppose; since the last call."""
         taken, self._contrary = self._contrary, []
         return taken
 
@@ -77,6 +77,8 @@ class Confirmation:
         support = self._consistency.support(number)
         if accepted:  # where our own tracking slipped, right poses contradict each other
             waits = by_odometry and _opposed(support)
+            if waits:
+                self._contrary.append((target, candidate))
             return replace(decision, refusal=_opposition(support), waits_as=number) if waits else decision
         if odds_of(candidate) < LEAST_ODDS:
             return _refused(source, target, registration)

@@ -199,7 +199,7 @@ class Registrar:
         found = self._register(candidates, keyframe, track, budget) if candidates else self._none_alike(keyframe)
         believed = found.accepted if track.proven else []
         closures, named = self._remember(keyframe, sightings, believed, found, track)
-        self._localise(keyframe, named, track, budget, tied=bool(closures))
+        self._localise(keyframe, named, track, budget)
         outcome = Outcome(
             closures=closures,
             rejected=(*given_up, *found.refused),
@@ -236,17 +236,14 @@ class Registrar:
             known = self._recollection.landmarks.placed(track.localisation.sessions(), EXPECTED)
             track.localisation.expect(keyframe, known)
 
-    def _localise(
-        self, keyframe: Keyframe, named: Sequence[Sighting], track: CameraTrack, budget: Budget, tied: bool
-    ) -> None:
+    def _localise(self, keyframe: Keyframe, named: Sequence[Sighting], track: CameraTrack, budget: Budget) -> None:
         """Look for another place of the camera that is followed; that gives no constraints."""
         contrary = track.confirmation.take_contrary()
         if track is self._tracks.followed and keyframe.by_odometry:
-            track.localisation.see(named, tied)
-            weigh_contrary(track.localisation, keyframe, contrary, self.params.least_odds)
-            if not tied:
-                places = self._recollection.index, track.hidden
-                search_elsewhere(track.localisation, keyframe, named, places, self._means(track), self.params, budget)
+            track.localisation.see(named)
+            means, places = self._means(track), (self._recollection.index, track.hidden)
+            weigh_contrary(track.localisation, keyframe, contrary, means.gate, self.params.least_odds)
+            search_elsewhere(track.localisation, keyframe, named, places, means, self.params, budget)
 
     def _none_alike(self, keyframe: Keyframe) -> Found:
         detail = f"none of {len(self._recollection.index)} stored objects is alike and may be here"

@@ -40,8 +40,13 @@ class Belief:
         elsewhere = min(1.0 - (1.0 - self.probability) * stays, WAITED)
         self._set(math.log(elsewhere / (1.0 - elsewhere)))
 
-    def weigh(self, log_ratio: float) -> None:
-        """Take in evidence: the log of how much likelier it is of a camera elsewhere than of one that is here."""
+    def weigh(self, log_ratio: float, most: float = math.inf) -> None:
+        """Take in evidence: the log of how much likelier it is of a camera elsewhere than of one that is here.
+
+        It raises the odds to ``most`` at most.
+        """
+        if log_ratio > 0.0:
+            log_ratio = min(log_ratio, max(math.log(most) - self._log_odds, 0.0))
         self._set(self._log_odds + log_ratio)
 
     def settle(self, odds: float) -> None:

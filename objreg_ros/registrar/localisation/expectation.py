@@ -30,11 +30,12 @@ LEAST_BEHIND = 0.9  # of those with known depth
 
 
 class Look(Enum):
-    """What a view shows in the place of a known object."""
+    """What a view shows in the place of a known object; OUTSIDE where it is not in the picture, or too vague."""
 
     SEEN = "seen"
     MISSING = "missing"
     NOTHING = "nothing"
+    OUTSIDE = "outside"
 
 
 class Place(NamedTuple):
@@ -55,9 +56,9 @@ class Shown(NamedTuple):
 
 
 def looks_of(places: Sequence[Place], shown: Sequence[Shown], view: View) -> list[Look]:
-    """What a view shows in each place; NOTHING for those outside of it."""
+    """What a view shows in each place."""
     inside = _inside(places, view)
-    return [_look(place, shown, view) if yes else Look.NOTHING for place, yes in zip(places, inside, strict=True)]
+    return [_look(place, shown, view) if yes else Look.OUTSIDE for place, yes in zip(places, inside, strict=True)]
 
 
 def _inside(places: Sequence[Place], view: View) -> list[bool]:

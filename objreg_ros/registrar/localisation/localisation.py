@@ -21,7 +21,7 @@ from objreg_ros.registrar.consistency import Standpoint, Statement
 from objreg_ros.registrar.localisation.belief import Belief
 from objreg_ros.registrar.localisation.contradiction import Says, Tied, difference, in_agreement, says
 from objreg_ros.registrar.localisation.expectation import Look, Place, looks_of
-from objreg_ros.registrar.localisation.memory import Familiar
+from objreg_ros.registrar.localisation.memory import OLD_NS, Familiar
 from objreg_ros.registrar.localisation.places import places_of, shown_by, sigma_of
 from objreg_ros.registrar.localisation.verdict import Standing, reason_of, state_of
 from objreg_ros.registrar.params import RegistrarParams
@@ -29,11 +29,14 @@ from objreg_ros.registrar.relocalisation import ALONE_ODDS, Relocalisation, drif
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
 
-# How often a known object is so in a place that the view shows, of a camera that is there and of one that is elsewhere.
-# Estimates, not measured: `benchmarks/localisation.py` counts looks, but those of places outside the picture too.
-LOOKS = {Look.SEEN: (0.6, 0.05), Look.MISSING: (0.03, 0.35)}
+# How often a known object in the picture is so, of a camera that is where odometry says and of one that is elsewhere.
+LOOKS = {Look.SEEN: (0.7, 0.2), Look.MISSING: (0.02, 0.06), Look.NOTHING: (0.28, 0.74), Look.OUTSIDE: (1.0, 1.0)}
+KEYFRAME = math.log(5.0)  # what all looks of a keyframe say together at most: they err together
+UNSEEN_ODDS = 0.3  # to which objects that are not detected can raise the odds: a detector may fail for long
 CONTRADICTS = 0.5  # of right closures of a camera that is elsewhere, so many contradict odometry by enough
+AGREE = 10.0  # so much likelier do right poses of two keyframes agree than false ones, at least
 DOUBTFUL_ODDS = 0.01  # of being elsewhere, from which the session is searched without odometry
+RIVALS = 32  # poses that contradict odometry that are kept, the newest
 EXPECTED = 1000  # landmarks, the newest, that are expected
 SHOWN_NS = 3_000_000_000  # for so long it is said that the camera was kidnapped: who looks once a second must see it
 
@@ -54,12 +57,13 @@ class Localisation:
         self._closure: LoopClosure | None = None
         self._target_travelled = math.nan
         self._linked = True  # the newest keyframe, to what counts
+        self._agreed_ns = -1  # the newest keyframe of which a closure to an older place agrees with odometry
         self._since_ns, self._moved_ns, self._kidnapped = stamp_ns, stamp_ns, ""
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether it is worth a search that does not believe odometry."""
-        return self._belief.odds >= DOUBTFUL_ODDS and bool(self._missing or self._rivals)
+        """Whether it is worth a search that does not believe odometry: nothing of the newest keyframe confirms it."""
+        return not self._linked or (self._belief.odds >= DOUBTFUL_ODDS and bool(self._missing or self._rivals))
 
     @property
     def since_ns(self) -> int:
@@ -84,28 +88,33 @@ class Localisation:
             places = places_of(known, keyframe, self._tied(), self._since_ns, self._params)
             looks = looks_of(places, shown_by(keyframe, self._groups), keyframe.view)
             found = list(zip(places, looks, strict=True))
-            confirmed = [self._weigh(place, look, keyframe.stamp_ns) for place, look in found]
-            self._linked = any(confirmed)
+            self._linked = self._weigh(found, keyframe.stamp_ns)
             return found
 
-    def _weigh(self, place: Place, look: Look, stamp_ns: int) -> bool:
-        """Weigh what is shown of an object; whether it says that the camera is where odometry says."""
-        if look is Look.SEEN and self._familiar.counts(place.landmark, stamp_ns):
-            self._missing.discard(place.landmark)
-            self._belief.weigh(ratio(look))
-            return True
-        if look is Look.MISSING and place.landmark not in self._missing:  # it is missed but once
-            self._missing.add(place.landmark)
-            self._belief.weigh(ratio(look))
-        return False
+    def _weigh(self, found: Sequence[tuple[Place, Look]], stamp_ns: int) -> bool:
+        """Weigh what is shown of objects; whether at least half of them say that it is where odometry says."""
+        looks = {place.landmark: look for place, look in found if self._says_something(place.landmark, look, stamp_ns)}
+        new = {landmark for landmark, look in looks.items() if look is Look.MISSING} - self._missing
+        seen = {landmark for landmark, look in looks.items() if look is Look.SEEN}
+        self._missing = (self._missing | new) - seen
+        log_ratio = sum(ratio(look) for look in looks.values())
+        most = math.inf if new else UNSEEN_ODDS
+        self._belief.weigh(min(max(log_ratio, -KEYFRAME), KEYFRAME), most)
+        return bool(seen) and 2 * len(seen) >= len(looks)
 
-    def see(self, named: Sequence[Sighting], tied: bool) -> None:
-        """Take in the objects of the keyframe under their landmarks; ``tied`` where a closure agreed."""
+    def _says_something(self, landmark: int, look: Look, stamp_ns: int) -> bool:
+        """What is missed says so but once."""
+        if look is Look.SEEN:
+            return self._familiar.counts(landmark, stamp_ns)
+        return look is Look.NOTHING or (look is Look.MISSING and landmark not in self._missing)
+
+    def see(self, named: Sequence[Sighting]) -> None:
+        """Take in the objects of the keyframe under their landmarks, after its closures."""
         with self._lock:
             if named and named[0].session == self._session:
-                first = named[0].stamp_ns <= self._since_ns
-                landmarks = (one.landmark for one in named)
-                self._familiar.see(landmarks, named[0].stamp_ns, self._linked or tied or first)
+                stamp_ns = named[0].stamp_ns
+                self._linked |= stamp_ns in (self._since_ns, self._agreed_ns)
+                self._familiar.see((one.landmark for one in named), stamp_ns, self._linked)
 
     def add_closure(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
         """Take in a closure, the later keyframe first, before the relocalisation does."""
@@ -139,18 +148,23 @@ class Localisation:
                     pass
 
     def _agrees(self, one: Statement, closure: LoopClosure | None) -> None:
-        """A closure that says nothing else than odometry does."""
+        """A closure that says nothing else than odometry does; of what came shortly before it says nothing more."""
         self._closure, self._target_travelled = closure or self._closure, one.target.travelled
+        if one.target.session == one.source.session and one.source.stamp_ns - one.target.stamp_ns < OLD_NS:
+            return  # the camera may have been taken away before both
+        self._agreed_ns = one.source.stamp_ns
         self._belief.weigh(-math.log(min(max(one.odds, 1.0), ALONE_ODDS)))
         self._rivals, self._before = [], None
 
     def _contradicts(self, one: Statement) -> None:
         """A closure that puts the camera elsewhere; two of them that agree have it taken there."""
         self._before = self._before or self._relocalisation.relocalised
-        if one.source.stamp_ns not in {other.source.stamp_ns for other in self._rivals}:  # those of one err together
-            self._belief.weigh(math.log(max(CONTRADICTS * min(one.odds, ALONE_ODDS), 1.0)))
-        self._rivals.append(one)
+        is_first = one.source.stamp_ns not in {other.source.stamp_ns for other in self._rivals}
+        self._rivals = [*self._rivals, one][-RIVALS:]
         same = in_agreement(self._rivals)
+        if is_first:  # those of one keyframe err together
+            weight = CONTRADICTS * min(one.odds, ALONE_ODDS) * (AGREE if same else 1.0)
+            self._belief.weigh(math.log(max(weight, 1.0)))
         if same and self._belief.odds >= 1.0:
             self._move(same)
 

@@ -17,6 +17,7 @@ from objreg_ros.registrar.candidate_search import Budget, Means
 from objreg_ros.registrar.localisation.localisation import Localisation
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration import align
+from objreg_ros.registration.api import Gate
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.gate.likelihood import odds_of
 from objreg_ros.registration.keyframe import Keyframe
@@ -25,11 +26,16 @@ TRIES = 2  # stored keyframes of each new one
 
 
 def weigh_contrary(
-    here: Localisation, keyframe: Keyframe, contrary: Iterable[tuple[Keyframe, Candidate]], least_odds: float
+    here: Localisation,
+    keyframe: Keyframe,
+    contrary: Iterable[tuple[Keyframe, Candidate]],
+    gate: Gate,
+    least_odds: float,
 ) -> None:
-    """Take poses that only odometry speaks against for rivals, where their odds are enough for a constraint."""
+    """Take poses for rivals that the gate accepts where odometry is not asked, nor what neighbours say."""
     for target, candidate in contrary:
-        if (odds := odds_of(candidate)) >= least_odds:
+        odds = odds_of(candidate)  # by what else was proposed: a gate that is given one alone knows nothing of that
+        if odds >= least_odds and isinstance(gate([candidate]), Candidate):
             here.add_rival(keyframe, target, candidate.T_target_source, odds)
 
 

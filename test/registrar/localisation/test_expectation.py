@@ -42,8 +42,9 @@ def test_what_is_hidden_or_stands_before_something_near_says_nothing() -> None:
 
 
 def test_what_is_outside_or_behind_or_cut_off_by_the_picture_says_nothing() -> None:
-    for place in (cup(x=5.0), cup(z=-1.0), cup(z=9.0), cup(x=0.57)):
-        assert look(place) is Look.NOTHING
+    for place in (cup(x=5.0), cup(z=-1.0), cup(z=9.0)):
+        assert look(place) is Look.OUTSIDE
+    assert look(cup(x=0.57)) is Look.NOTHING
 
 
 def test_what_is_not_measured_says_nothing() -> None:
@@ -55,7 +56,7 @@ def test_a_vague_place_must_be_looked_through_all_over_and_a_vaguer_one_says_not
     edge[:, 90:] = 1.0  # something stands 10 cm beside the middle
     assert look(cup(sigma_m=0.0), depth=edge) is Look.MISSING
     assert look(cup(sigma_m=0.1), depth=edge) is Look.NOTHING
-    assert look(cup(sigma_m=0.5)) is Look.NOTHING
+    assert look(cup(sigma_m=0.5)) is Look.OUTSIDE
 
 
 def test_without_known_objects_nothing_is_expected() -> None:
