@@ -242,6 +242,18 @@ def test_the_landmarks_of_late_are_those_of_the_session_that_were_seen_last() ->
     assert [known.landmark for known in landmarks.recent(1, 3)] == [5]
 
 
+def test_the_places_of_landmarks_are_those_in_the_sessions_asked_for_of_the_ones_seen_last() -> None:
+    landmarks = Landmarks(PARAMS)
+    for number in range(1, 6):
+        _take(landmarks, _seen(number, box("cup", (number, 0, 1)), session=number // 5))
+    _take(landmarks, _seen(6, box("cup", (5, 0, 1)), session=1))
+    placed = landmarks.placed({0, 1}, 3)
+    assert [(number, last.session, views) for number, last, views in placed] == [(5, 1, 2), (4, 0, 1), (3, 0, 1)]
+    assert np.allclose(placed[1][1].position, (4, 0, 1), atol=0.01)
+    assert [number for number, *_ in landmarks.placed({0}, 2)] == [4]
+    assert landmarks.placed({7}, 3) == [] and landmarks.placed((), 3) == []
+
+
 def test_a_landmark_whose_last_keyframe_is_forgotten_is_gone_and_its_id_is_not_given_again() -> None:
     landmarks = Landmarks(PARAMS)
     for keyframe_id in (1, 2):

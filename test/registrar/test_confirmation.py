@@ -189,3 +189,24 @@ def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() 
 def test_a_gate_that_refuses_without_a_reason_is_an_error() -> None:
     with pytest.raises(ValueError, match="expected a reason with each refusal, got None"):
         Confirmation(PARAMS).decide(*tried(0.0)._replace(registration=RefusedRegistration(reason=None)))
+
+
+def test_what_only_odometry_speaks_against_is_contrary_and_is_taken_once() -> None:
+    confirmation, one = Confirmation(PARAMS), tried(0.0)
+    for reason, taken in ((Reason.ODOMETRY, 1), (Reason.FREE_SPACE, 0)):
+        refused = RefusedRegistration(reason=reason, detail="", candidate=one.registration.candidate)
+        confirmation.decide(*one._replace(registration=refused))
+        contrary = confirmation.take_contrary()
+        assert [target for target, _ in contrary] == [one.target] * taken
+        assert all(found is one.registration.candidate for _, found in contrary)
+        assert confirmation.take_contrary() == []
+
+
+def test_an_accepted_pose_that_its_neighbours_contradict_is_contrary_and_one_that_is_published_is_not() -> None:
+    confirmation = Confirmation(PARAMS)
+    for at_m in (0.0, 0.1, 0.2):
+        confirmation.decide(*tried(at_m))
+    assert confirmation.take_contrary() == []
+    wrong = tried(0.3, ASIDE)
+    assert kind_of(confirmation.decide(*wrong)) == "waits"
+    assert confirmation.take_contrary() == [(wrong.target, wrong.registration.candidate)]

@@ -210,3 +210,23 @@ def test_poses_are_of_the_map_whatever_the_frames_are() -> None:
     found = walk.relocalisation.relocalised
     assert found is not None
     assert np.allclose(inverse(found.T_map_odom) @ found.T_map_camera, np.eye(4), atol=1e-9)
+
+
+def test_ties_before_the_camera_was_taken_elsewhere_are_forgotten(walk: Pass) -> None:
+    for metres in (0.0, 0.2, 0.4):
+        walk.close(metres)
+    walk.close(0.6, wrong=ASIDE)
+    walk.relocalisation.begin_at(round(100.6 * SECOND))
+    assert walk.relocalisation.relocalised is None
+    walk.close(0.8, wrong=ASIDE)
+    found = walk.relocalisation.relocalised
+    assert found is not None and found.closures == 2
+    assert not np.allclose(found.T_map_odom, T_MAP_ODOM, atol=0.1)
+
+
+def test_ties_since_it_was_taken_elsewhere_suffice_where_they_agree(walk: Pass) -> None:
+    walk.close(0.0)
+    walk.close(0.2)
+    walk.relocalisation.begin_at(round(100.0 * SECOND))
+    found = walk.relocalisation.relocalised
+    assert found is not None and found.closures == 2 and np.allclose(found.T_map_odom, T_MAP_ODOM, atol=1e-9)

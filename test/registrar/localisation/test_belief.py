@@ -46,3 +46,15 @@ def test_an_earlier_stamp_is_passed_over() -> None:
     belief.wait(3 * SECOND)
     belief.wait(11 * SECOND)
     assert belief.probability < 1.1 * (1.0 / 3600.0 + 1e-6)
+
+
+def test_weak_evidence_raises_the_odds_to_its_bound_at_most_and_never_lowers_them() -> None:
+    belief = Belief()
+    belief.settle(100.0)
+    belief.weigh(math.log(12.0), 0.1)
+    assert belief.odds == pytest.approx(0.1)
+    belief.weigh(math.log(10.0))
+    belief.weigh(math.log(10.0), 0.1)
+    assert belief.odds == pytest.approx(1.0)
+    belief.weigh(-math.log(10.0), 0.1)
+    assert belief.odds == pytest.approx(0.1)

@@ -8,14 +8,21 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from registration.samples import box, keyframe, moved
+from registration.samples import box, candidate, keyframe, moved
 
 from objreg_ros.memory.retrieval import CandidateKeyframe, Index
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar.candidate_search import Budget
-from objreg_ros.registrar.localisation.search import TRIES, accepted_poses, places_without_odometry
+from objreg_ros.registrar.localisation.search import (
+    TRIES,
+    accepted_poses,
+    places_without_odometry,
+    weigh_contrary,
+)
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registration.gate.likelihood import odds_of
+from objreg_ros.registration.gate.verdict import judge
 
 PARAMS = RegistrarParams()
 CUP = box("cup", (0.0, 0.0, 1.0))
@@ -41,3 +48,14 @@ def test_what_cannot_be_read_or_is_not_begun_in_time_is_left_out() -> None:
     places = [CandidateKeyframe(1, 0, 0, 1.0)]
     assert list(accepted_poses(keyframe(), places, means, PARAMS, ENDLESS)) == []
     assert list(accepted_poses(keyframe(), places, means, PARAMS, Budget(0.0, lambda: True))) == []
+
+
+def test_poses_that_the_gate_accepts_without_odometry_are_rivals_and_others_are_not() -> None:
+    rivals: list[Any] = []
+    here: Any = SimpleNamespace(add_rival=lambda *one: rivals.append(one))
+    source, target, good = keyframe(2, 20.0), keyframe(1, 10.0), candidate(moved(1.0))
+    through, doubtful = candidate(certain_violations=0.2), candidate(correlation=0.1, tested=2000)
+    weigh_contrary(here, source, [(target, one) for one in (good, through, doubtful)], judge, 75.0)
+    assert rivals == [(source, target, good.T_target_source, odds_of(good))]
+    weigh_contrary(here, source, [(target, good)], judge, 1e9)
+    assert len(rivals) == 1
