@@ -30,6 +30,8 @@ from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
 
 # How often a known object in the picture is so, of a camera that is where odometry says and of one that is elsewhere.
+# Rounded guesses beside few counts: seen where odometry is right are 0.8 (a simulated room), 0.6 (KITCHEN), 0.3 (RPY),
+# elsewhere 0.3 (KITCHEN); looked through none of 1300, elsewhere 4 of 62. `KEYFRAME` and `UNSEEN_ODDS` keep them small.
 LOOKS = {Look.SEEN: (0.7, 0.2), Look.MISSING: (0.02, 0.06), Look.NOTHING: (0.28, 0.74), Look.OUTSIDE: (1.0, 1.0)}
 KEYFRAME = math.log(5.0)  # what all looks of a keyframe say together at most: they err together
 UNSEEN_ODDS = 0.3  # to which objects that are not detected can raise the odds: a detector may fail for long
