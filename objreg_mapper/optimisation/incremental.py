@@ -211,8 +211,9 @@ class IncrementalGraph:
         if len(nodes) <= PAIR or self._is_careful:
             joint = isam.jointMarginalCovariance(nodes)
             return np.block([[joint.at(a, b) for b in nodes] for a in nodes])
-        order = self._gtsam.Ordering(nodes)
         linear = isam.getFactorsUnsafe().linearize(isam.getLinearizationPoint())
-        R = linear.marginalMultifrontalBayesNet(order).matrix()[0]
-        inverse = np.linalg.inv(R)
-        return np.asarray(inverse @ inverse.T)
+        net = linear.marginalMultifrontalBayesNet(self._gtsam.Ordering(nodes))
+        order = [net.at(k).firstFrontalKey() for k in range(net.size())]  # it need not be that of the nodes
+        inverse = np.linalg.inv(net.matrix()[0])
+        rows = (6 * np.argsort(order)[np.searchsorted(np.sort(order), nodes)][:, None] + np.arange(6)).ravel()
+        return np.asarray((inverse @ inverse.T)[np.ix_(rows, rows)])

@@ -144,3 +144,16 @@ def test_what_is_known_of_many_edges_is_what_is_known_of_each() -> None:
     for at, one in enumerate((asked[2], asked[0], asked[1])):
         part = slice(6 * at, 6 * at + 6)
         np.testing.assert_allclose(known[part, part], graph.error_covariance(one), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gtsam_may_eliminate_nodes_in_an_order_of_its_own(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    nodes = [0, *(1 + rng.permutation(29)).tolist()]
+    edges = edges_of([])
+    for k in range(1, 30):  # a tree, whose branches have numbers all mixed
+        edges = edges.joined(edge(nodes[int(rng.integers(k))], nodes[k], np.eye(4), float(rng.uniform(0.01, 1.0))))
+    graph = IncrementalGraph.begun(np.eye(4))
+    graph.grow(np.tile(np.eye(4), (29, 1, 1)), edges)
+    known = graph.error_covariance(edges)
+    np.testing.assert_allclose(known, np.eye(6 * 29), atol=1e-6)
