@@ -282,7 +282,7 @@ def main(
     for make in paths:
         path = make()
         with read_source(path, detector_of(options["model"], options["threshold"]), options["seed"]) as source:
-            params = RegistrarParams(seed=options["seed"]).replaced(**source.camera)
+            params = RegistrarParams(seed=options["seed"], kidnapping_search=True).replaced(**source.camera)
             tallies[path.name] = measure(source.frames, source.truth, params, options["kidnappings"], options["seed"])
         click.echo(line(path.name, summary([tallies[path.name]])))
         if out is not None:

@@ -20,6 +20,12 @@ class RegistrarParams(KeyframeParams, MemoryParams):
 
     closures: int = param(2, "accepted closures of one keyframe that end its search", ge=1, live=True)
     threads: int = param(2, "stored keyframes that are tried at once", ge=1, le=16)
+    kidnapping_search: bool = param(
+        False,
+        "search for the camera wherever odometry has it, while that is in doubt, so that localisation_state knows one "
+        "that was carried away; it takes up to two more registrations a keyframe, and gives no constraints",
+        live=True,
+    )
     confirm_seconds: float = param(
         10.0,
         "longest time that a likely pose waits for poses of other keyframes that agree by way of "

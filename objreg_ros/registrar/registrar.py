@@ -243,7 +243,8 @@ class Registrar:
             track.localisation.see(named)
             means, places = self._means(track), (self._recollection.index, track.hidden)
             weigh_contrary(track.localisation, keyframe, contrary, means.gate, self.params.least_odds)
-            search_elsewhere(track.localisation, keyframe, named, places, means, self.params, budget)
+            if self.params.kidnapping_search:
+                search_elsewhere(track.localisation, keyframe, named, places, means, self.params, budget)
 
     def _none_alike(self, keyframe: Keyframe) -> Found:
         detail = f"none of {len(self._recollection.index)} stored objects is alike and may be here"

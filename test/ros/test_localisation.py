@@ -22,6 +22,7 @@ from .test_blackbox import about
 from .test_relocalised import BESIDE, HERE, MOUNT, T_ODOM_MAP, ask, frame, remember, tell
 
 pytestmark = pytest.mark.ros
+SEARCH = "-p kidnapping_search:=true"
 with_messages = pytest.mark.skipif(
     localisation_msg.LocalisationStateMsg is None,
     reason="objreg_msgs is not installed: colcon builds it from this repository",
@@ -53,7 +54,7 @@ def test_a_robot_that_is_carried_elsewhere_is_kidnapped_once_closures_agree(fres
     fresh.receive(DiagnosticArray, "/diagnostics")
     if localisation_msg.LocalisationStateMsg is not None:
         fresh.receive(localisation_msg.LocalisationStateMsg, "localisation_state", qos.latched())
-    fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
+    fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", SEARCH, MOUNT)
     T_carried = T_ODOM_MAP.copy()  # where odometry's frame is in the map once it has missed two metres
     T_carried[0, 3] += 2.0
     steps = [(100, T_ODOM_MAP @ BESIDE, BESIDE), (103, T_ODOM_MAP @ HERE, HERE)]
@@ -77,7 +78,7 @@ def test_the_topic_says_what_diagnostics_say_with_the_closure_behind_it(fresh: G
     fresh.receive(DiagnosticArray, "/diagnostics")
     fresh.receive(localisation_msg.LocalisationStateMsg, "localisation_state", qos.latched(100))
     fresh.receive(closures_msg.LoopClosureMsg, "loop_closures", qos.latched(qos.KEPT_CONSTRAINTS))
-    fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
+    fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", SEARCH, MOUNT)
     frames = [frame(seconds, T_ODOM_MAP @ T, T) for seconds, T in ((100, BESIDE), (103, HERE), (106, BESIDE))]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for one in frames:
