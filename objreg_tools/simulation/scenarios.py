@@ -10,6 +10,7 @@
 | `posters` | like `look-alikes`, and every picture on the walls is one of two |
 | `moved` | like `loop`, but the things on the first table are rearranged while the second is looked at |
 | `days` | two rounds, and two a day later, when a third of all things stand elsewhere |
+| `twins` | two rounds through two equal places that differ in one poster, one book or where one chair stands |
 
 A round leads along one long wall to the second table and along the other one back.
 """
@@ -42,6 +43,7 @@ from objreg_tools.simulation.world.rooms import (
     things,
 )
 from objreg_tools.simulation.world.scene import Placed, Scene, furnished, number
+from objreg_tools.simulation.world.twins import MIDDLE_X, T_SECOND_FIRST, Twins, make_twins
 
 Random = np.random.Generator
 
@@ -52,6 +54,8 @@ DETOUR_M = 1.4
 NEAR_M = 0.3
 Plot = tuple[tuple[Scene, ...], list[Waypoint], Waypoint | float | None]
 """The scenes, the camera's path, and where the second scene takes over: a waypoint, or a share of the frames."""
+HEIGHT_M, STEP_M = 1.35, 0.7
+"""Of a camera that goes through an opening: its height, and how far before and behind it looks straight ahead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,6 +235,37 @@ def _same_numbers(before: Scene, after: Scene) -> Scene:
     return after.with_objects([Placed(numbers[id(o.model)], o.model, o.T_world_object) for o in after.objects])
 
 
+def _twins(rng: Random, occluders: int) -> Plot:
+    twins = make_twins(rng, occluders)
+    path = _visit(rng, twins, 0)
+    for k in (1, 0, 1):
+        path += [*_through(k), *_visit(rng, twins, k)]
+    return (twins.scene,), path, None
+
+
+def _visit(rng: Random, twins: Twins, k: int) -> list[Waypoint]:
+    """A look at the table of place ``k`` and one along the wall behind it, in either order."""
+    front, turned = twins.front + 180.0 * k, np.linalg.matrix_power(T_SECOND_FIRST, k)
+    sweep, aside = float(rng.choice([-1, 1])) * 40, float(rng.uniform(-25, 25))
+    look = CameraLook.at_random(rng, front + aside - sweep / 2, sweep).waypoints(twins.scene.places[k].centre)
+    eye = transform(turned, np.array([MIDDLE_X + rng.uniform(-0.4, 0.4), 0.0, HEIGHT_M]))
+    azimuths = np.radians(front + 180.0 + float(rng.choice([-1, 1])) * np.linspace(-50, 50, 7))
+    along = [Waypoint(eye, eye + np.array([np.cos(a), np.sin(a), -0.1])) for a in azimuths]
+    return [*along, *look] if rng.random() < 0.5 else [*look, *along]
+
+
+def _through(to: int) -> list[Waypoint]:
+    """Through the opening between twin places, looking ahead."""
+    ahead = 1.0 if to else -1.0
+    eyes = [np.array([ahead * step, 0.0, HEIGHT_M]) for step in (-STEP_M, 0.0, STEP_M)]
+    return [Waypoint(eye, eye + np.array([ahead, 0.0, -0.2])) for eye in eyes]
+
+
+def twins_of(seed: int, occluders: int = 0) -> Twins:
+    """The places of the scenario `twins` of a seed: what differs in them, and where."""
+    return make_twins(_sown("twins", seed), occluders)
+
+
 SCENARIOS: dict[str, Callable[[Random, int], Plot]] = {
     "orbit": _orbit,
     "loop": _loop,
@@ -239,9 +274,14 @@ SCENARIOS: dict[str, Callable[[Random, int], Plot]] = {
     "moved": _moved,
     "posters": _posters,
     "days": _days,
+    "twins": _twins,
 }
 OF_ONE_DAY = tuple(name for name in SCENARIOS if name != "days")
 """What training draws from."""
+
+
+def _sown(scenario: str, seed: int) -> Random:
+    return np.random.default_rng([seed, 31, list(SCENARIOS).index(scenario)])
 
 
 def make_plan(scenario: str, seed: int, frames: int = 600, rate: float = 30.0, occluders: int = 0) -> RecordingPlan:
@@ -252,7 +292,7 @@ def make_plan(scenario: str, seed: int, frames: int = 600, rate: float = 30.0, o
     """
     if scenario not in SCENARIOS:
         raise ValueError(f"expected one of {', '.join(SCENARIOS)}, got {scenario!r}")
-    rng = np.random.default_rng([seed, 31, list(SCENARIOS).index(scenario)])
+    rng = _sown(scenario, seed)
     scenes, waypoints, change = SCENARIOS[scenario](rng, occluders)
     poses, rate = carried(waypoints, frames, rate, rng, Hand())
     scene_of = np.zeros(frames, int)
