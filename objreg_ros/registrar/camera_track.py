@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.data.frames import Frame
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
+from objreg_ros.memory.landmarks import Landmark
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.closure import Decision, WaitingClosure, redundant, rejected, waiting_of
@@ -18,6 +19,7 @@ from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registrar.relocalisation import Relocalisation
+from objreg_ros.registrar.rivalry import Rivalry
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registrar.vetoes import VETOED, Vetoes
 from objreg_ros.registration.gate.refusal import Refusal
@@ -44,6 +46,7 @@ class CameraTrack:
         self.localisation = Localisation(params, self.relocalisation)
         self.confirmation = Confirmation(params)
         self.thinning = Thinning(params.thin_seconds)
+        self._rivalry: Rivalry | None = None
         self.proven = True  # whether enough of the camera was seen to believe it
         self.unproven: list[WaitingClosure] = []  # accepted while it was not
         self.hidden: frozenset[int] = frozenset()
@@ -55,6 +58,12 @@ class CameraTrack:
         """Another run of the clock goes on from now."""
         self.clock, self.hidden, self.sessions = clock, hidden, set()
         self.thinning = Thinning(params.thin_seconds)
+
+    def rivalry_among(self, known: Callable[[], Sequence[Landmark]]) -> Rivalry:
+        """What decides between places that fit alike; ``known`` gives the landmarks that are there."""
+        if self._rivalry is None:
+            self._rivalry = Rivalry(self._params, known)
+        return self._rivalry
 
     def see(self, keyframe: Keyframe) -> None:
         """Go on to a keyframe."""

@@ -14,20 +14,25 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import Reason, Rejected
+from objreg_ros.data.closures import Alike, Reason, Rejected, Relocalised
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.closure import Decision, redundant, rejected
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.consistency import Standpoint
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.rivalry import Rivalry, may_rival, rivals
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registrar.vetoes import VETOED, Vetoes
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
+from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.propose.prior import Prior, expect
-from objreg_ros.registration.result import Registration
+from objreg_ros.registration.result import Registration, evidence_of
+
+RIVAL_TRIES = 2  # of keyframes in other places, for one that is accepted
+RIVAL_VOTES = 0.5  # of the most that is left, that a rival has
 
 
 class Budget(NamedTuple):
@@ -72,14 +77,20 @@ class Means(NamedTuple):
     confirmation: Confirmation
     pool: ThreadPoolExecutor
     vetoes: Vetoes
+    rivalry: Rivalry | None = None
+    tied: Relocalised | None = None
 
 
 class Found(NamedTuple):
-    """What the candidates of one keyframe came to, in the order in which they were tried."""
+    """What the candidates of one keyframe came to, in the order in which they were tried.
+
+    ``alike`` where it fits two places and nothing decides.
+    """
 
     accepted: list[Decision]
     waiting: list[Decision]
     refused: list[Rejected]
+    alike: Alike | None = None
 
 
 _Try = tuple[CandidateKeyframe, Callable[[], Decision | Rejected] | None]
@@ -117,7 +128,59 @@ class Search:
                 found.accepted.append(decision)
             else:
                 found.waiting.append(decision)
-        return found
+        rivalry = self._means.rivalry
+        return found if rivalry is None or not found.accepted else self._without_rivals(found, queue, rivalry)
+
+    def _without_rivals(self, found: Found, queue: deque[CandidateKeyframe], rivalry: Rivalry) -> Found:
+        """What is left of all that was found where another place of the same map fits as well."""
+        one = found.accepted[0]
+        other = next((d for d in (*found.accepted[1:], *found.waiting) if rivals(one, d, self._params)), None)
+        other = other or self._rival(one, queue)
+        if other is None:
+            return found
+        winner, why = rivalry.winner(self._keyframe, one, other, self._means.tied)
+        alike = rivalry.alike(self._keyframe, one, other) if winner is None else None
+        detail = f"{why}; {alike.advice}" if alike is not None else f"{why} for another place"
+        kept, every = Found([], [], found.refused, alike), [*found.accepted, *found.waiting]
+        for decision in every if other in every else [*every, other]:
+            if winner is None or rivals(winner, decision, self._params):
+                self._withdraw(decision, found.accepted)
+                kept.refused.append(self._refused_as(decision, (Reason.ALIKE, detail)))
+            else:
+                if decision.accepted and decision not in found.accepted:
+                    self._thinning.accept(decision.target.session, decision.target.stamp_ns, self._keyframe.stamp_ns)
+                (kept.accepted if decision.accepted else kept.waiting).append(decision)
+        return kept
+
+    def _rival(self, one: Decision, queue: deque[CandidateKeyframe]) -> Decision | None:
+        """A pose in another place than one that was accepted, among what is likely and was not tried; mostly None."""
+        likely = [(stored, ask) for stored, ask in self._trying] + [(stored, None) for stored in queue]
+        least = RIVAL_VOTES * max((s.votes for s, _ in likely), default=0.0)
+        tries = RIVAL_TRIES
+        for stored, ask in likely:
+            if stored.votes < least or stored.session != one.target.session or tries == 0:
+                continue
+            try:
+                target = self._means.store.keyframe(stored.keyframe_id)
+            except StoreError:
+                continue
+            if may_rival(one, target, self._params):
+                tries -= 1
+                decision = (ask or self._try_candidate(stored))()
+                if isinstance(decision, Decision) and rivals(one, decision, self._params):
+                    return decision
+        return None
+
+    def _withdraw(self, decision: Decision, accepted: list[Decision]) -> None:
+        self._means.confirmation.leave_out(decision)
+        if decision in accepted:
+            target = decision.target
+            self._thinning.withdraw(target.session, target.stamp_ns, self._keyframe.stamp_ns)
+
+    def _refused_as(self, decision: Decision, refusal: Refusal) -> Rejected:
+        refused = rejected(decision.target.stamp_ns, self._keyframe, refusal, decision.target)
+        pose, evidence = decision.candidate.T_target_source, evidence_of(decision.candidate)
+        return replace(refused, T_from_to=pose, evidence=evidence)
 
     def _is_redundant(self, stored: CandidateKeyframe) -> bool:
         return self._thinning.redundant(stored.session, stored.stamp_ns, self._keyframe.stamp_ns)

@@ -29,7 +29,7 @@ class Decision:
 
     It is accepted where ``refusal`` is None. Else it waits for other keyframes by the number of its statement,
     ``waits_as``, and is refused for that where they do not confirm it. ``support`` is what others say of it, where that
-    was asked.
+    was asked. ``statement`` is the number of its statement, None where it made none.
     """
 
     target: Keyframe
@@ -37,6 +37,7 @@ class Decision:
     support: Support | None = None
     refusal: Refusal | None = None
     waits_as: int | None = None
+    statement: int | None = None
 
     @property
     def accepted(self) -> bool:

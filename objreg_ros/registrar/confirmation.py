@@ -74,7 +74,7 @@ class Confirmation:
             return decision
         by_odometry = source.by_odometry and target.by_odometry
         number = self._consistency.add_statement(_statement(source, target, candidate, accepted, by_odometry))
-        support = self._consistency.support(number)
+        support, decision = self._consistency.support(number), replace(decision, statement=number)
         if accepted:  # where our own tracking slipped, right poses contradict each other
             waits = by_odometry and _opposed(support)
             if waits:
@@ -85,6 +85,11 @@ class Confirmation:
         if _confirmed(support):
             return replace(decision, support=support)
         return replace(decision, refusal=_refusal(registration), waits_as=number)
+
+    def leave_out(self, decision: Decision) -> None:
+        """Forget what a decision said: it confirms and opposes nothing."""
+        if decision.statement is not None:
+            self._consistency.remove_statement(decision.statement)
 
     def hold(self, number: int, waiting: WaitingClosure) -> None:
         """Let a held pose wait, with what its constraint needs once the keyframes are gone."""

@@ -188,11 +188,16 @@ class Consistency:
 
     def _leave_out(self, gone: Iterable[int]) -> None:
         for n in dict.fromkeys(gone):
-            del self._statements[n]
-            for m in self._agree.pop(n):
-                self._agree[m].discard(n)
-            for m in self._near.pop(n):
-                del self._near[m][n]
+            self.remove_statement(n)
+
+    def remove_statement(self, number: int) -> None:
+        """Forget a statement that is still known; one that is not is passed over."""
+        if self._statements.pop(number, None) is None:
+            return
+        for m in self._agree.pop(number):
+            self._agree[m].discard(number)
+        for m in self._near.pop(number):
+            del self._near[m][number]
 
 
 def _same_sessions(one: Statement, other: Statement) -> bool:

@@ -209,6 +209,7 @@ class Registrar:
             frame_id=keyframe.frame_id,
             session=keyframe.session,
             robot=keyframe.robot,
+            alike=found.alike,
         )
         return outcome.with_late(track.settle_waiting(keyframe.stamp_ns, self._recollection))
 
@@ -228,7 +229,9 @@ class Registrar:
 
     def _means(self, track: CameraTrack) -> Means:
         gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
-        return Means(self._store, self._method, gate, track.confirmation, pool, self._recollection.vetoes)
+        rivalry, tied = track.rivalry_among(self._recollection.landmarks.known), track.relocalisation.relocalised
+        vetoes = self._recollection.vetoes
+        return Means(self._store, self._method, gate, track.confirmation, pool, vetoes, rivalry, tied)
 
     def _expect(self, keyframe: Keyframe, track: CameraTrack) -> None:
         """Compare what was known before it with a keyframe of the camera that is followed."""

@@ -7,10 +7,11 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from registration.samples import box, candidate, keyframe
+from registration.samples import box, candidate, keyframe, moved
 
 from objreg_ros.bridge.node.worker import give_way
 from objreg_ros.data.closures import Reason
@@ -20,6 +21,7 @@ from objreg_ros.memory.store import Store
 from objreg_ros.registrar.candidate_search import Budget, Means, Pools, Search
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.rivalry import Rivalry
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registrar.vetoes import Vetoes
 from objreg_ros.registration.candidate import Candidate
@@ -73,33 +75,33 @@ def ids(*numbers: int) -> list[CandidateKeyframe]:
 
 
 def test_no_more_keyframes_are_tried_than_are_asked_for_best_first(means: Means) -> None:
-    accepted, _, refused = search(means).run(ids(3, 1, 5, 2, 4))
+    accepted, _, refused = search(means).run(ids(3, 1, 5, 2, 4))[:3]
     assert accepted == [] and [one.reason for one in refused] == [Reason.GRAVITY] * 3
     assert means.method.targets == [20, 0, 40]
 
 
 def test_enough_accepted_closures_end_the_search(means: Means) -> None:
-    accepted, _, refused = search(means._replace(gate=accept)).run(ids(3, 1, 5, 2, 4))
+    accepted, _, refused = search(means._replace(gate=accept)).run(ids(3, 1, 5, 2, 4))[:3]
     assert [item.target.keyframe_id for item in accepted] == [3, 1] and refused == []
 
 
 def test_what_would_say_the_same_again_is_put_aside_without_a_try(means: Means) -> None:
     params = PARAMS.replaced(thin_seconds=15.0)
-    accepted, _, refused = search(means._replace(gate=accept), params).run(ids(2, 1, 5))
+    accepted, _, refused = search(means._replace(gate=accept), params).run(ids(2, 1, 5))[:3]
     assert [item.target.keyframe_id for item in accepted] == [2, 5]
     assert [one.reason for one in refused] == [Reason.REDUNDANT]
 
 
 def test_what_is_not_begun_in_time_is_refused_as_over_budget(means: Means) -> None:
     for budget in (Budget(time.monotonic() - 1.0, lambda: False), Budget(float("inf"), lambda: True)):
-        accepted, _, refused = search(means, budget=budget).run(ids(1, 2))
+        accepted, _, refused = search(means, budget=budget).run(ids(1, 2))[:3]
         assert accepted == [] and [one.reason for one in refused] == [Reason.OVER_BUDGET] * 2
     assert means.method.targets == []
 
 
 def test_what_waits_for_others_counts_as_tried_and_closes_nothing(means: Means) -> None:
     waits = means._replace(confirmation=Confirmation(PARAMS.replaced(confirm_seconds=10.0)))
-    accepted, held, refused = search(waits).run(ids(3, 1, 5, 2))
+    accepted, held, refused = search(waits).run(ids(3, 1, 5, 2))[:3]
     assert [one.target.keyframe_id for one in held] == [3, 1, 5] and not accepted and not refused
 
 
@@ -117,3 +119,30 @@ def test_a_nicer_thread_gets_a_pool_of_its_own_and_the_same_one_again() -> None:
     pools.shutdown()
     with pytest.raises(RuntimeError, match="shutdown"):
         pools.fitting().submit(print)
+
+
+@pytest.fixture
+def two_places() -> Iterator[Means]:
+    """One session that passed by two places 6 m apart, and looks for rivals."""
+    store = Store()
+    for number, x in enumerate((0.0, 6.0), 1):
+        there = replace(keyframe(number, STORED[number - 1], CUPS), T_odom_camera=moved(x), by_odometry=True)
+        store.write_keyframe(replace(there, travelled=x), sightings_of(there))
+    params = PARAMS.replaced(confirm_seconds=10.0)
+    with ThreadPoolExecutor(1) as pool:
+        yield Means(store, Recorded(), accept, Confirmation(params), pool, Vetoes(), Rivalry(params))
+    store.close()
+
+
+def test_of_two_places_that_fit_alike_none_is_accepted_though_enough_are(two_places: Means) -> None:
+    thinning, params = Thinning(1.0), PARAMS.replaced(closures=1)
+    found = Search(replace(keyframe(9, NOW, CUPS), session=1), thinning, ENDLESS, two_places, params).run(ids(1, 2))
+    assert not found.accepted and not found.waiting and found.alike is not None
+    assert [one.reason for one in found.refused] == [Reason.ALIKE] * 2 and two_places.method.targets == [0, 10]
+    assert "look around" in found.refused[0].detail and not thinning.redundant(0, 0, round(1e9 * NOW))
+
+
+def test_a_place_that_no_other_fits_is_accepted(two_places: Means) -> None:
+    params = PARAMS.replaced(closures=1)
+    found = Search(replace(keyframe(9, NOW, CUPS), session=1), Thinning(1.0), ENDLESS, two_places, params).run(ids(1))
+    assert len(found.accepted) == 1 and found.alike is None
