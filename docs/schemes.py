@@ -174,6 +174,11 @@ SCHEMES = {
         words(200, 24, "how the picture moves", EARLIER), words(200, 90, "what camera_info says", WRONG),
         words(200, 140, "no closure is made with a camera that is not what it says"),
     ),
+    "places_alike": picture(
+        line([(60, 40), (160, 40)], EARLIER, 6), line([(240, 40), (340, 40)], EARLIER, 6),
+        line([(150, 110), (250, 110)], NEW, 6), arrow(180, 104, 120, 48, WRONG), arrow(220, 104, 280, 48, WRONG),
+        words(200, 140, "both places fit: neither is published"),
+    ),
     "neighbours_disagree": picture(
         line([(60, 40), (160, 35), (260, 40), (340, 35)], EARLIER),
         line([(60, 110), (160, 105), (260, 110), (340, 105)], NEW),

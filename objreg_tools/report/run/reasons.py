@@ -156,6 +156,13 @@ REFUSALS = {
         (),
         (("registrar/consistency.py", "REACH_M"),),
     ),
+    "places_alike": ReasonText(
+        "another place of the map fits as well",
+        "Equal places are distinguished by what differs in them. Look where the detail says, or go on until something "
+        "else is in sight.",
+        ("registrar.odometry_drift",),
+        (("registrar/rivalry.py", "LEAST_LEAD"), ("registration/score/differing_parts.py", "OTHER")),
+    ),
     "camera_implausible": ReasonText(
         "the camera, or the scale of its depth, differs from what the stream states",
         "The detail gives the measured and the stated value. Correct camera_info, or set the camera.",
