@@ -132,16 +132,22 @@ class Search:
         return found if rivalry is None or not found.accepted else self._without_rivals(found, queue, rivalry)
 
     def _without_rivals(self, found: Found, queue: deque[CandidateKeyframe], rivalry: Rivalry) -> Found:
-        """What is left of all that was found where another place of the same map fits as well."""
-        one = found.accepted[0]
-        other = next((d for d in (*found.accepted[1:], *found.waiting) if rivals(one, d, self._params)), None)
+        """What is left of all that was found where other places of the same maps fit as well."""
+        for one in {d.target.session: d for d in reversed(found.accepted)}.values():  # the first of each map
+            found = self._without_rivals_of(one, found, queue, rivalry)
+        return found
+
+    def _without_rivals_of(
+        self, one: Decision, found: Found, queue: deque[CandidateKeyframe], rivalry: Rivalry
+    ) -> Found:
+        other = next((d for d in (*found.accepted, *found.waiting) if rivals(one, d, self._params)), None)
         other = other or self._rival(one, queue)
         if other is None:
-            return found
+            return self._as_remembered(one, found, rivalry)
         winner, why = rivalry.winner(self._keyframe, one, other, self._means.tied)
         alike = rivalry.alike(self._keyframe, one, other) if winner is None else None
         detail = f"{why}; {alike.advice}" if alike is not None else f"{why} for another place"
-        kept, every = Found([], [], found.refused, alike), [*found.accepted, *found.waiting]
+        kept, every = Found([], [], found.refused, alike or found.alike), [*found.accepted, *found.waiting]
         for decision in every if other in every else [*every, other]:
             if winner is None or rivals(winner, decision, self._params):
                 self._withdraw(decision, found.accepted)
@@ -152,13 +158,28 @@ class Search:
                 (kept.accepted if decision.accepted else kept.waiting).append(decision)
         return kept
 
+    def _as_remembered(self, one: Decision, found: Found, rivalry: Rivalry) -> Found:
+        """What is left where this keyframe shows no rival: nothing at a place that has one which is not ruled out."""
+        why = rivalry.doubt(self._keyframe, one)
+        if not why:
+            return found
+        kept = Found([], [], found.refused, found.alike)
+        for decision in (*found.accepted, *found.waiting):
+            if decision.target.session == one.target.session:
+                self._withdraw(decision, found.accepted)
+                kept.refused.append(self._refused_as(decision, (Reason.ALIKE, why)))
+            else:
+                (kept.accepted if decision.accepted else kept.waiting).append(decision)
+        return kept
+
     def _rival(self, one: Decision, queue: deque[CandidateKeyframe]) -> Decision | None:
         """A pose in another place than one that was accepted, among what is likely and was not tried; mostly None."""
         likely = [(stored, ask) for stored, ask in self._trying] + [(stored, None) for stored in queue]
-        least = RIVAL_VOTES * max((s.votes for s, _ in likely), default=0.0)
+        likely = [of for of in likely if of[0].session == one.target.session != self._keyframe.session]
+        least = RIVAL_VOTES * max((stored.votes for stored, _ in likely), default=0.0)
         tries = RIVAL_TRIES
         for stored, ask in likely:
-            if stored.votes < least or stored.session != one.target.session or tries == 0:
+            if stored.votes < least or tries == 0:
                 continue
             try:
                 target = self._means.store.keyframe(stored.keyframe_id)

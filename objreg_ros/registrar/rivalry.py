@@ -30,6 +30,7 @@ DEVIATIONS = 3.0  # of odometry
 LEAST_LEAD = 3  # keyframes by which one place leads, that decide
 LEAST_TIMES = 3.0  # as many as for the other; and the pixels of one keyframe
 LEAST_PX = 25  # of a view, that speak for a place
+TIED_BY = 3  # closures that agree, to a map: one may be of the twin
 REACH_M = 5.0  # to what may be looked at
 SAME_SPOT_M = 0.3  # between a landmark here and one there that are equal
 LEAST_VIEWS = 2  # of a landmark: what one keyframe alone shows may be noise
@@ -68,12 +69,28 @@ class Rivalry:
             self._session, self._tallies = source.session, []
         votes = self._counted(source, one, other)
         said = f"{votes[0]:.0f} keyframes speak for one place, {votes[1]:.0f} for the other"
-        if abs(votes[0] - votes[1]) >= LEAST_LEAD and votes.max() >= LEAST_TIMES * votes.min():
-            return (one if votes[0] > votes[1] else other), said
+        if _leads(*votes):
+            return one, said
+        if _leads(*votes[::-1]):
+            return other, said
         near = [self._is_expected(source, two, tied) for two in (one, other)]
         if near[0] != near[1]:
             return (one if near[0] else other), f"{said}, and the tie to the map"
         return None, said
+
+    def doubt(self, source: Keyframe, one: Decision) -> str:
+        """Why a pose is not believed though this keyframe shows no rival: its place has one, of an earlier keyframe of
+        the session, that is not ruled out. Empty where it is believed.
+        """
+        if source.session != self._session:
+            return ""
+        place = place_of(source, one)
+        for tally in self._tallies:
+            for mine, theirs, of in ((0, 1, tally.one), (1, 0, tally.other)):
+                if self._same(source, place, of) and not _leads(tally.votes[mine], tally.votes[theirs]):
+                    votes = tally.votes[[mine, theirs]]
+                    return f"{votes[0]:.0f} keyframes speak for this place, {votes[1]:.0f} for one that fitted as well"
+        return ""
 
     def _counted(self, source: Keyframe, one: Decision, other: Decision) -> Array:
         """The votes (2,) of the session for either, with those of this keyframe."""
@@ -101,7 +118,12 @@ class Rivalry:
 
     def _is_expected(self, source: Keyframe, one: Decision, tied: Relocalised | None) -> bool:
         """Whether the camera is there by where the session is tied to the map."""
-        if tied is None or tied.session != one.target.session or source.session == one.target.session:
+        if (
+            tied is None
+            or tied.closures < TIED_BY
+            or tied.session != one.target.session
+            or source.session == one.target.session
+        ):
             return False
         return self._same(source, place_of(source, one), Place(tied.session, tied.T_map_odom))
 
@@ -140,6 +162,10 @@ class Rivalry:
                 if float(np.linalg.norm(xyz)) < REACH_M:
                     near.append((self._groups.of(mark.label), xyz))
         return near
+
+
+def _leads(votes: float, others: float) -> bool:
+    return votes - others >= LEAST_LEAD and votes >= LEAST_TIMES * others
 
 
 def apart(one: Keyframe, T_one_source: Array, other: Keyframe, T_other_source: Array, params: RegistrarParams) -> bool:

@@ -68,6 +68,19 @@ def test_what_differs_decides_once_enough_keyframes_show_it_and_holds_for_the_se
     assert rivalry.winner(replace(new(100), session=2), ONE, OTHER, None)[0] is None
 
 
+def test_a_place_that_had_a_rival_is_doubted_until_more_speaks_for_it() -> None:
+    rivalry = Rivalry(PARAMS)
+    assert rivalry.doubt(new(), ONE) == ""
+    bright = painted(HERE, 230)
+    one, other = replace(ONE, target=bright), replace(OTHER, target=painted(THERE, 20))
+    rivalry.winner(new(), ONE, OTHER, None)
+    assert rivalry.doubt(new(91), ONE).startswith("0 keyframes speak for this place, 0 for one")
+    for k in range(LEAST_LEAD):
+        rivalry.winner(painted(new(92 + k), 230), one, other, None)
+    assert rivalry.doubt(new(99), ONE) == "" and rivalry.doubt(new(99), OTHER) != ""
+    assert rivalry.doubt(replace(new(99), session=2), OTHER) == ""
+
+
 def test_the_tie_to_the_map_decides_where_nothing_differs() -> None:
     place = place_of(new(), OTHER)
     tied = Relocalised(
