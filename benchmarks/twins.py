@@ -33,8 +33,8 @@ import cv2
 import numpy as np
 from closure import simulated
 from command_line import quick_values
-from relocalisation import LATER_NS, begun_anew, remember
 from rooms import keyframes_of
+from sessions import LATER_NS, begun_anew, remember
 from sources import detector_of, read_source
 
 from objreg_ros.data.checked import Array

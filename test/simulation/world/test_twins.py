@@ -41,6 +41,7 @@ def test_they_look_different_only_where_that_thing_is(kind: str) -> None:
     eye = np.array([spots[0][0], 0.0, 1.4])
     T = looking(eye, spots[0], UP)
     first, second = (render(twins.scene, S @ T, SMALL) for S in (np.eye(4), T_SECOND_FIRST))
+    assert first.rgb is not None and second.rgb is not None
     grey = np.abs(first.rgb.astype(float) - second.rgb.astype(float)).max(axis=2)
     differs = np.abs(first.true_depth - second.true_depth) > 0.05 if kind == "chair" else grey > 40.0
     assert np.count_nonzero(differs) > 10
