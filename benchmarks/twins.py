@@ -8,8 +8,8 @@ of its own, in odometry that begins anew. Four figures come of it:
   through the search, which knows the map. ``false`` are those that are published.
 * sessions: constraints to the right place and to its twin, keyframes that are said to fit both, and whether the
   session ends with the right place known, of those that saw what differs (within REACH_M of it, in its picture).
-* twin not stored: the same where the map is the first visit alone and the session is in the other place. That visit ends with a
-  look through the opening, so something of the other place is stored, and it is no clean measure.
+* twin not stored: the same where the map is the first visit alone and the session is in the other place. That visit
+  ends with a look through the opening, so something of the other place is stored, and it is no clean measure.
 
     python benchmarks/twins.py --quick
     python benchmarks/twins.py --seeds 100,101,102 --json OUT
