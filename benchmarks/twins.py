@@ -41,16 +41,17 @@ from sources import detector_of, read_source
 from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure, Reason
 from objreg_ros.data.frames import Frame, View
+from objreg_ros.data.localisation import State
 from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.retrieval import CandidateKeyframe, Index
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.camera_track import CameraTrack
 from objreg_ros.registrar.candidate_search import Budget, Means, Search
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registrar.relocalisation import Relocalisation
 from objreg_ros.registrar.rivalry import Rivalry
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registrar.vetoes import Vetoes
@@ -103,16 +104,16 @@ def sessions(
 
 def visit(frames: Sequence[Frame], truth: Truth, twins: Twins, params: RegistrarParams) -> dict[str, Any]:
     """What becomes of one visit."""
-    place, seen, alike, advised, refused = place_of(truth, frames[0].stamp_ns), 0, 0, 0, 0
+    place, seen, alike, refused = place_of(truth, frames[0].stamp_ns), 0, 0, 0
     closures: list[LoopClosure] = []
     views = {frame.stamp_ns: frame.view for frame in frames}
     with closing(Registrar(params)) as registrar:
         for outcome in [*(registrar.process(frame) for frame in begun_anew(list(frames))), registrar.finish()]:
             closures += [one for one in outcome.closures if one.from_session != one.to_session]
-            alike += outcome.alike is not None
-            advised += outcome.alike is not None and outcome.alike.look is not None
             refused += sum(one.reason is Reason.ALIKE for one in outcome.rejected)
             if outcome.keyframe_ns is not None:
+                state = registrar.localisation
+                alike += state is not None and state.state is State.AMBIGUOUS
                 stamp_ns = outcome.keyframe_ns - LATER_NS
                 T = truth.at(stamp_ns)
                 seen += T is not None and stamp_ns in views and shows(views[stamp_ns], T, twins, place)
@@ -124,7 +125,6 @@ def visit(frames: Sequence[Frame], truth: Truth, twins: Twins, params: Registrar
         "constraints": len(closures),
         "false": len(wrong),
         "alike": int(alike),
-        "advised": int(advised),
         "refused_as_alike": int(refused),
         "known": last is not None and last not in wrong,
     }
@@ -150,7 +150,7 @@ def forced(
         for keyframe, twin in spaced(pairs_of(later, known, truth), tries):
             natural = index.query(sightings_of(keyframe))
             first = CandidateKeyframe(twin.keyframe_id, twin.session, twin.stamp_ns, natural[0].votes if natural else 1)
-            for rule in [None] if alone else [None, Rivalry(once, landmarks.known)]:
+            for rule in [None] if alone else [None, Rivalry(Relocalisation())]:
                 means = Means(stored, method, gate, Confirmation(once), pool, Vetoes(), rule)
                 rest = [one for one in natural if one.keyframe_id != twin.keyframe_id]
                 found = Search(keyframe, Thinning(once.thin_seconds), ENDLESS, means, once).run([first, *rest])
@@ -161,7 +161,7 @@ def forced(
                         break
                 else:
                     done["false"] += any(one.target.keyframe_id == twin.keyframe_id for one in found.accepted)
-                    done["alike"] += found.alike is not None
+                    done["alike"] += bool(found.alike)
     if alone:
         done["false"] = done["accepted"]
     return done
@@ -221,6 +221,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "saw": len(saw),
         "known": sum(one["known"] for one in saw),
         "not_stored_constraints": sum(one["constraints"] for row in rows for one in row["not_stored"]),
+        "not_stored_false": sum(one["false"] for row in rows for one in row["not_stored"]),
     }
 
 
@@ -230,19 +231,19 @@ def line(name: str, of: dict[str, Any]) -> str:
     return (
         f"{name:16} {tries['tried']:>6} {tries['accepted']:>8} {tries['false']:>6} {of['sessions']:>9} "
         f"{of['constraints']:>12} {of['false']:>6} {of['alike']:>6} {of['known']:>6}/{of['saw']:<5} "
-        f"{of['not_stored_constraints']:>10}"
+        f"{of['not_stored_constraints']:>10} {of['not_stored_false']:>6}"
     )
 
 
 HEAD = (
     f"{'recording':16} {'forced':>6} {'by gate':>8} {'false':>6} {'sessions':>9} {'constraints':>12} {'false':>6} "
-    f"{'alike':>6} {'known/saw':>12} {'not stored':>10}"
+    f"{'alike':>6} {'known/saw':>12} {'not stored':>10} {'false':>6}"
 )
 
 
 def without_rivals() -> None:
     """Look for no twins, in this process."""
-    CameraTrack.rivalry_among = lambda self, known: None  # type: ignore[method-assign,assignment,return-value]
+    Search._without_rivals = lambda self, found, *_: found  # type: ignore[method-assign,assignment]
 
 
 @click.command(help=__doc__)

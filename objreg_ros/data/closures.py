@@ -178,37 +178,6 @@ class Relocalised:
         require(self, bool(np.isfinite(self.covariance).all()), "a finite covariance", self.covariance.tolist())
 
 
-@data_type
-class Alike:
-    """A keyframe at ``stamp_ns`` fits two places of the map of a ``session``, and nothing decides between them.
-
-    ``targets_ns`` are the stamps of a stored keyframe of either. ``look (3,)`` m in the camera is the nearest object
-    that one of them has and the other has not, of this ``label``; None where none is known.
-    """
-
-    stamp_ns: int
-    session: int
-    targets_ns: tuple[int, int]
-    label: str = ""
-    look: Array | None = None
-
-    def __post_init__(self) -> None:
-        if self.look is not None:
-            hold_array(self, "look", np.float64, (3,), {})
-
-    @property
-    def advice(self) -> str:
-        """Which direction to look in, in words."""
-        if self.look is None:
-            return "no object is known that only one of them has: look around"
-        x, _, z = self.look.tolist()
-        degrees = float(np.degrees(np.arctan2(x, z)))
-        side = "right" if degrees >= 0.0 else "left"
-        return (
-            f"look {abs(degrees):.0f} degrees {side}, {np.linalg.norm(self.look):.1f} m: one has a {self.label} there"
-        )
-
-
 class Reason(Enum):
     """Why something was refused. The value is what diagnostics and JSON show."""
 

@@ -10,7 +10,7 @@ from objreg_ros.data.closures import LoopClosure
 
 
 class State(IntEnum):
-    """What objreg_msgs/LocalisationState says under the same names; `AMBIGUOUS` is reserved."""
+    """What objreg_msgs/LocalisationState says under the same names."""
 
     TRACKING = 0
     SURE = 1

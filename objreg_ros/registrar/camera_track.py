@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.data.frames import Frame
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
-from objreg_ros.memory.landmarks import Landmark
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.closure import Decision, WaitingClosure, redundant, rejected, waiting_of
@@ -46,7 +45,7 @@ class CameraTrack:
         self.localisation = Localisation(params, self.relocalisation)
         self.confirmation = Confirmation(params)
         self.thinning = Thinning(params.thin_seconds)
-        self._rivalry: Rivalry | None = None
+        self.rivalry = Rivalry(self.relocalisation)
         self.proven = True  # whether enough of the camera was seen to believe it
         self.unproven: list[WaitingClosure] = []  # accepted while it was not
         self.hidden: frozenset[int] = frozenset()
@@ -58,12 +57,6 @@ class CameraTrack:
         """Another run of the clock goes on from now."""
         self.clock, self.hidden, self.sessions = clock, hidden, set()
         self.thinning = Thinning(params.thin_seconds)
-
-    def rivalry_among(self, known: Callable[[], Sequence[Landmark]]) -> Rivalry:
-        """What decides between places that fit alike; ``known`` gives the landmarks that are there."""
-        if self._rivalry is None:
-            self._rivalry = Rivalry(self._params, known)
-        return self._rivalry
 
     def see(self, keyframe: Keyframe) -> None:
         """Go on to a keyframe."""

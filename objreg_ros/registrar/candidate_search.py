@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import Alike, Reason, Rejected, Relocalised
+from objreg_ros.data.closures import Reason, Rejected
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.closure import Decision, redundant, rejected
@@ -78,19 +78,18 @@ class Means(NamedTuple):
     pool: ThreadPoolExecutor
     vetoes: Vetoes
     rivalry: Rivalry | None = None
-    tied: Relocalised | None = None
 
 
 class Found(NamedTuple):
     """What the candidates of one keyframe came to, in the order in which they were tried.
 
-    ``alike`` where it fits two places and nothing decides.
+    ``alike`` says why nothing decides where it fits two places, and is empty elsewhere.
     """
 
     accepted: list[Decision]
     waiting: list[Decision]
     refused: list[Rejected]
-    alike: Alike | None = None
+    alike: str = ""
 
 
 _Try = tuple[CandidateKeyframe, Callable[[], Decision | Rejected] | None]
@@ -144,10 +143,10 @@ class Search:
         other = other or self._rival(one, queue)
         if other is None:
             return self._as_remembered(one, found, rivalry)
-        winner, why = rivalry.winner(self._keyframe, one, other, self._means.tied)
-        alike = rivalry.alike(self._keyframe, one, other) if winner is None else None
-        detail = f"{why}; {alike.advice}" if alike is not None else f"{why} for another place"
-        kept, every = Found([], [], found.refused, alike or found.alike), [*found.accepted, *found.waiting]
+        winner, why = rivalry.winner(self._keyframe, one, other)
+        detail = f"{why}; nothing decides" if winner is None else f"{why}: another place"
+        alike = detail if winner is None else found.alike
+        kept, every = Found([], [], found.refused, alike), [*found.accepted, *found.waiting]
         for decision in every if other in every else [*every, other]:
             if winner is None or rivals(winner, decision, self._params):
                 self._withdraw(decision, found.accepted)
@@ -163,7 +162,7 @@ class Search:
         why = rivalry.doubt(self._keyframe, one)
         if not why:
             return found
-        kept = Found([], [], found.refused, found.alike)
+        kept = Found([], [], found.refused, why)
         for decision in (*found.accepted, *found.waiting):
             if decision.target.session == one.target.session:
                 self._withdraw(decision, found.accepted)

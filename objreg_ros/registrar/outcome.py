@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from objreg_ros.data.closures import Alike, LoopClosure, Observation, Rejected
+from objreg_ros.data.closures import LoopClosure, Observation, Rejected
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -15,7 +15,6 @@ class Outcome:
 
     ``withdrawn`` are closures of before that a person has vetoed.
     With the objects of that keyframe under the ids of their landmarks, its camera, its session and its robot.
-    ``alike`` is said where it fits two places of a map, and nothing decides which.
     """
 
     closures: tuple[LoopClosure, ...] = ()
@@ -27,7 +26,6 @@ class Outcome:
     frame_id: str = "camera"
     session: int | None = None
     robot: str = ""
-    alike: Alike | None = None
 
     def with_late(self, late: Outcome) -> Outcome:
         """With what became of earlier keyframes' poses; a late constraint keeps its own stamps."""

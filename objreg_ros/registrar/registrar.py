@@ -199,6 +199,8 @@ class Registrar:
         found = self._register(candidates, keyframe, track, budget) if candidates else self._none_alike(keyframe)
         believed = found.accepted if track.proven else []
         closures, named = self._remember(keyframe, sightings, believed, found, track)
+        if not closures:
+            track.localisation.set_alike(found.alike)
         self._localise(keyframe, named, track, budget)
         outcome = Outcome(
             closures=closures,
@@ -209,7 +211,6 @@ class Registrar:
             frame_id=keyframe.frame_id,
             session=keyframe.session,
             robot=keyframe.robot,
-            alike=found.alike,
         )
         return outcome.with_late(track.settle_waiting(keyframe.stamp_ns, self._recollection))
 
@@ -229,9 +230,8 @@ class Registrar:
 
     def _means(self, track: CameraTrack) -> Means:
         gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
-        rivalry, tied = track.rivalry_among(self._recollection.landmarks.known), track.relocalisation.relocalised
         vetoes = self._recollection.vetoes
-        return Means(self._store, self._method, gate, track.confirmation, pool, vetoes, rivalry, tied)
+        return Means(self._store, self._method, gate, track.confirmation, pool, vetoes, track.rivalry)
 
     def _expect(self, keyframe: Keyframe, track: CameraTrack) -> None:
         """Compare what was known before it with a keyframe of the camera that is followed."""

@@ -9,20 +9,17 @@ tied to the map. A place whose twin is not stored has no rival.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.data.closures import Alike, Relocalised
-from objreg_ros.geometry import inverse, pose_error, transform
-from objreg_ros.memory.landmarks import Landmark
+from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.registrar.closure import Decision
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.relocalisation import Relocalisation
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.score.differing_parts import differing_parts
 
 LEAST_M, LEAST_DEG = 0.5, 30.0  # between poses that are two places, and more where odometry may err by more
@@ -31,9 +28,6 @@ LEAST_LEAD = 3  # keyframes by which one place leads, that decide
 LEAST_TIMES = 3.0  # as many as for the other; and the pixels of one keyframe
 LEAST_PX = 25  # of a view, that speak for a place
 TIED_BY = 3  # closures that agree, to a map: one may be of the twin
-REACH_M = 5.0  # to what may be looked at
-SAME_SPOT_M = 0.3  # between a landmark here and one there that are equal
-LEAST_VIEWS = 2  # of a landmark: what one keyframe alone shows may be noise
 
 
 class Place(NamedTuple):
@@ -53,17 +47,14 @@ class _Tally:
 
 
 class Rivalry:
-    """What speaks for which of rival places, of one camera. ``known`` gives the landmarks that are there."""
+    """What speaks for which of rival places, of the camera whose ``relocalisation`` this is."""
 
-    def __init__(self, params: RegistrarParams, known: Callable[[], Sequence[Landmark]] = tuple) -> None:
-        self._params, self._known = params, known
-        self._groups = LabelGroups(params.label_groups)
+    def __init__(self, relocalisation: Relocalisation) -> None:
+        self._relocalisation = relocalisation
         self._session = -1
         self._tallies: list[_Tally] = []
 
-    def winner(
-        self, source: Keyframe, one: Decision, other: Decision, tied: Relocalised | None
-    ) -> tuple[Decision | None, str]:
+    def winner(self, source: Keyframe, one: Decision, other: Decision) -> tuple[Decision | None, str]:
         """Which of two rivals (see `apart`) is right, None where nothing decides, and by what it is known."""
         if source.session != self._session:
             self._session, self._tallies = source.session, []
@@ -73,7 +64,7 @@ class Rivalry:
             return one, said
         if _leads(*votes[::-1]):
             return other, said
-        near = [self._is_expected(source, two, tied) for two in (one, other)]
+        near = [self._is_expected(source, two) for two in (one, other)]
         if near[0] != near[1]:
             return (one if near[0] else other), f"{said}, and the tie to the map"
         return None, said
@@ -116,8 +107,9 @@ class Rivalry:
         degrees, centimetres = pose_error(one.T_map_odom @ here, other.T_map_odom @ here)
         return degrees < 2 * LEAST_DEG and 0.01 * centimetres < 4 * LEAST_M
 
-    def _is_expected(self, source: Keyframe, one: Decision, tied: Relocalised | None) -> bool:
+    def _is_expected(self, source: Keyframe, one: Decision) -> bool:
         """Whether the camera is there by where the session is tied to the map."""
+        tied = self._relocalisation.relocalised
         if (
             tied is None
             or tied.closures < TIED_BY
@@ -126,46 +118,6 @@ class Rivalry:
         ):
             return False
         return self._same(source, place_of(source, one), Place(tied.session, tied.T_map_odom))
-
-    def alike(self, source: Keyframe, one: Decision, other: Decision) -> Alike:
-        """What is said of two places between which nothing decides, and where to look."""
-        look = self._nearest_difference(source, one, other)
-        return Alike(
-            stamp_ns=source.stamp_ns,
-            session=one.target.session,
-            targets_ns=(one.target.stamp_ns, other.target.stamp_ns),
-            label="" if look is None else look[0],
-            look=None if look is None else look[1],
-        )
-
-    def _nearest_difference(self, source: Keyframe, one: Decision, other: Decision) -> tuple[str, Array] | None:
-        """The nearest landmark of either place that the other has not: its label and its middle (3,) in the camera."""
-        here, there = (self._in_camera(source, d) for d in (one, other))
-        alone = [
-            (float(np.linalg.norm(xyz)), label, xyz)
-            for mine, theirs in ((here, there), (there, here))
-            for label, xyz in mine
-            if not any(label == name and np.linalg.norm(xyz - at) < SAME_SPOT_M for name, at in theirs)
-        ]
-        if not alone or not here or not there:
-            return None
-        _, label, xyz = min(alone, key=lambda of: of[0])
-        return label, xyz
-
-    def _in_camera(self, source: Keyframe, one: Decision) -> list[tuple[str, Array]]:
-        """The landmarks around, if the camera is there: label group and middle (3,) m in the camera."""
-        T_camera_map = inverse(T_map_camera(one))
-        near = []
-        for mark in self._known():
-            if mark.session == one.target.session and mark.sightings >= LEAST_VIEWS:
-                xyz = np.asarray(transform(T_camera_map, mark.position))
-                if float(np.linalg.norm(xyz)) < REACH_M:
-                    near.append((self._groups.of(mark.label), xyz))
-        return near
-
-
-def _leads(votes: float, others: float) -> bool:
-    return votes - others >= LEAST_LEAD and votes >= LEAST_TIMES * others
 
 
 def apart(one: Keyframe, T_one_source: Array, other: Keyframe, T_other_source: Array, params: RegistrarParams) -> bool:
@@ -202,6 +154,10 @@ def place_of(source: Keyframe, one: Decision) -> Place:
 def T_map_camera(one: Decision) -> Array:
     """(4, 4) of the new keyframe in the frame of the target's session."""
     return np.asarray(_pose_of(one.target) @ one.candidate.T_target_source)
+
+
+def _leads(votes: float, others: float) -> bool:
+    return votes - others >= LEAST_LEAD and votes >= LEAST_TIMES * others
 
 
 def _pose_of(keyframe: Keyframe) -> Array:

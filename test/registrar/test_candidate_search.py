@@ -21,6 +21,7 @@ from objreg_ros.memory.store import Store
 from objreg_ros.registrar.candidate_search import Budget, Means, Pools, Search
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.relocalisation import Relocalisation
 from objreg_ros.registrar.rivalry import Rivalry
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registrar.vetoes import Vetoes
@@ -130,19 +131,19 @@ def two_places() -> Iterator[Means]:
         store.write_keyframe(replace(there, travelled=x), sightings_of(there))
     params = PARAMS.replaced(confirm_seconds=10.0)
     with ThreadPoolExecutor(1) as pool:
-        yield Means(store, Recorded(), accept, Confirmation(params), pool, Vetoes(), Rivalry(params))
+        yield Means(store, Recorded(), accept, Confirmation(params), pool, Vetoes(), Rivalry(Relocalisation()))
     store.close()
 
 
 def test_of_two_places_that_fit_alike_none_is_accepted_though_enough_are(two_places: Means) -> None:
     thinning, params = Thinning(1.0), PARAMS.replaced(closures=1)
     found = Search(replace(keyframe(9, NOW, CUPS), session=1), thinning, ENDLESS, two_places, params).run(ids(1, 2))
-    assert not found.accepted and not found.waiting and found.alike is not None
+    assert not found.accepted and not found.waiting and found.alike
     assert [one.reason for one in found.refused] == [Reason.ALIKE] * 2 and two_places.method.targets == [0, 10]
-    assert "look around" in found.refused[0].detail and not thinning.redundant(0, 0, round(1e9 * NOW))
+    assert "nothing decides" in found.refused[0].detail and not thinning.redundant(0, 0, round(1e9 * NOW))
 
 
 def test_a_place_that_no_other_fits_is_accepted(two_places: Means) -> None:
     params = PARAMS.replaced(closures=1)
     found = Search(replace(keyframe(9, NOW, CUPS), session=1), Thinning(1.0), ENDLESS, two_places, params).run(ids(1))
-    assert len(found.accepted) == 1 and found.alike is None
+    assert len(found.accepted) == 1 and not found.alike

@@ -4,15 +4,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 from registration.samples import box, candidate, keyframe, moved
 
 from objreg_ros.data.closures import Relocalised
-from objreg_ros.memory.landmarks import Landmark
 from objreg_ros.registrar.closure import Decision
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.rivalry import LEAST_LEAD, Rivalry, apart, may_rival, place_of, rivals
+from objreg_ros.registrar.relocalisation import Relocalisation
+from objreg_ros.registrar.rivalry import LEAST_LEAD, TIED_BY, Rivalry, apart, may_rival, place_of, rivals
 from objreg_ros.registration.keyframe import Keyframe
 
 PARAMS = RegistrarParams()
@@ -31,6 +33,11 @@ def new(seconds: float = 90) -> Keyframe:
 
 HERE, THERE = stored(1, 0.0, 0.0), stored(2, AWAY_M, 7.0)
 ONE, OTHER = (Decision(target=target, candidate=candidate()) for target in (HERE, THERE))
+
+
+def rivalry(tied: Relocalised | None = None) -> Rivalry:
+    """What decides for a camera that is tied so."""
+    return Rivalry(cast(Relocalisation, SimpleNamespace(relocalised=tied)))
 
 
 def painted(there: Keyframe, shade: int) -> Keyframe:
@@ -54,31 +61,31 @@ def test_of_two_sessions_nothing_is_known() -> None:
 
 
 def test_nothing_decides_between_equal_places_however_often_they_are_seen() -> None:
-    rivalry = Rivalry(PARAMS)
-    assert [rivalry.winner(new(90 + k), ONE, OTHER, None)[0] for k in range(9)] == [None] * 9
+    judge = rivalry()
+    assert [judge.winner(new(90 + k), ONE, OTHER)[0] for k in range(9)] == [None] * 9
 
 
 def test_what_differs_decides_once_enough_keyframes_show_it_and_holds_for_the_session() -> None:
-    rivalry, bright = Rivalry(PARAMS), painted(HERE, 230)
+    judge, bright = rivalry(), painted(HERE, 230)
     one, other = replace(ONE, target=bright), replace(OTHER, target=painted(THERE, 20))
     for k in range(LEAST_LEAD):
-        winner, said = rivalry.winner(painted(new(90 + k), 230), one, other, None)
+        winner, said = judge.winner(painted(new(90 + k), 230), one, other)
         assert winner is (one if k + 1 >= LEAST_LEAD else None), said
-    assert rivalry.winner(new(99), OTHER, ONE, None)[0] is ONE  # nothing that differs is in sight
-    assert rivalry.winner(replace(new(100), session=2), ONE, OTHER, None)[0] is None
+    assert judge.winner(new(99), OTHER, ONE)[0] is ONE  # nothing that differs is in sight
+    assert judge.winner(replace(new(100), session=2), ONE, OTHER)[0] is None
 
 
 def test_a_place_that_had_a_rival_is_doubted_until_more_speaks_for_it() -> None:
-    rivalry = Rivalry(PARAMS)
-    assert rivalry.doubt(new(), ONE) == ""
+    judge = rivalry()
+    assert judge.doubt(new(), ONE) == ""
     bright = painted(HERE, 230)
     one, other = replace(ONE, target=bright), replace(OTHER, target=painted(THERE, 20))
-    rivalry.winner(new(), ONE, OTHER, None)
-    assert rivalry.doubt(new(91), ONE).startswith("0 keyframes speak for this place, 0 for one")
+    judge.winner(new(), ONE, OTHER)
+    assert judge.doubt(new(91), ONE).startswith("0 keyframes speak for this place, 0 for one")
     for k in range(LEAST_LEAD):
-        rivalry.winner(painted(new(92 + k), 230), one, other, None)
-    assert rivalry.doubt(new(99), ONE) == "" and rivalry.doubt(new(99), OTHER) != ""
-    assert rivalry.doubt(replace(new(99), session=2), OTHER) == ""
+        judge.winner(painted(new(92 + k), 230), one, other)
+    assert judge.doubt(new(99), ONE) == "" and judge.doubt(new(99), OTHER) != ""
+    assert judge.doubt(replace(new(99), session=2), OTHER) == ""
 
 
 def test_the_tie_to_the_map_decides_where_nothing_differs() -> None:
@@ -92,19 +99,6 @@ def test_the_tie_to_the_map_decides_where_nothing_differs() -> None:
         covariance=np.eye(6),
         closures=3,
     )
-    assert Rivalry(PARAMS).winner(new(), ONE, OTHER, tied)[0] is OTHER
-    assert Rivalry(PARAMS).winner(new(), ONE, OTHER, replace(tied, session=4))[0] is None
-
-
-def test_the_nearest_object_that_one_place_has_alone_is_where_to_look() -> None:
-    def landmark(number: int, label: str, x: float, z: float) -> Landmark:
-        xyz = np.array([x, 0.0, z])
-        return Landmark(landmark=number, label=label, position=xyz, session=0, stamp_ns=0, sightings=3)
-
-    known = [landmark(1, "cup", 0.0, 1.0), landmark(2, "cup", AWAY_M, 1.0)]
-    assert Rivalry(PARAMS, lambda: known).alike(new(), ONE, OTHER).look is None
-    known += [landmark(3, "book", AWAY_M + 2.0, 2.0), landmark(4, "chair", -1.0, 1.0)]
-    alike = Rivalry(PARAMS, lambda: known).alike(new(), ONE, OTHER)
-    assert alike.label == "chair" and alike.look is not None and np.allclose(alike.look, [-1.0, 0.0, 1.0])
-    assert alike.advice == "look 45 degrees left, 1.4 m: one has a chair there"
-    assert "look around" in replace(alike, look=None).advice
+    assert rivalry(tied).winner(new(), ONE, OTHER)[0] is OTHER
+    assert rivalry(replace(tied, session=4)).winner(new(), ONE, OTHER)[0] is None
+    assert rivalry(replace(tied, closures=TIED_BY - 1)).winner(new(), ONE, OTHER)[0] is None

@@ -58,6 +58,7 @@ class Localisation:
         self._before: Relocalised | None = None  # the tie before them
         self._closure: LoopClosure | None = None
         self._target_travelled = math.nan
+        self._alike = ""
         self._linked = True  # the newest keyframe, to what counts
         self._agreed_ns = -1  # the newest keyframe of which a closure to an older place agrees with odometry
         self._since_ns, self._moved_ns, self._kidnapped = stamp_ns, stamp_ns, ""
@@ -118,8 +119,15 @@ class Localisation:
                 self._linked |= stamp_ns in (self._since_ns, self._agreed_ns)
                 self._familiar.see((one.landmark for one in named), stamp_ns, self._linked)
 
+    def set_alike(self, why: str) -> None:
+        """A keyframe without a closure fits two places of a map, if ``why`` says so; until a closure to a map comes."""
+        with self._lock:
+            self._alike = why or self._alike
+
     def add_closure(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
         """Take in a closure, the later keyframe first, before the relocalisation does."""
+        if source.session == self._session != target.session:
+            self._alike = ""
         odds = closure.evidence.get("odds", 1.0)
         one = Statement(Standpoint.of(source), Standpoint.of(target), closure.T_from_to, odds, True)
         self._state(one, source, target, closure)
@@ -227,6 +235,7 @@ class Localisation:
                 missing=len(self._missing),
                 contradicting=len(self._rivals),
                 kidnapped=self._kidnapped,
+                alike=self._alike,
             )
             return LocalisationState(
                 stamp_ns=stamp_ns,

@@ -16,7 +16,8 @@ LOST_FROM = 0.5  # probability of being elsewhere
 class Standing(NamedTuple):
     """What is known at a frame: the probability of being ``elsewhere``, ``sigma_m`` of each axis (NaN: no map is tied),
     ``age_s`` of the last closure (NaN: none), which known objects are ``missing``, how many closures ``contradict``
-    odometry, and a sentence of how the camera was ``kidnapped``, empty where it was not.
+    odometry, a sentence of how the camera was ``kidnapped``, empty where it was not, and one of two places that fit
+    ``alike``, empty where none do.
     """
 
     elsewhere: float
@@ -25,6 +26,7 @@ class Standing(NamedTuple):
     missing: int
     contradicting: int
     kidnapped: str = ""
+    alike: str = ""
 
     @property
     def probability(self) -> float:
@@ -46,6 +48,8 @@ def state_of(now: Standing) -> State:
         return State.KIDNAPPED
     if now.elsewhere >= LOST_FROM:
         return State.LOST
+    if now.alike:
+        return State.AMBIGUOUS
     if math.isnan(now.sigma_m):
         return State.TRACKING
     return State.SURE if now.probability >= LEAST_SURE else State.UNSURE
@@ -59,6 +63,8 @@ def reason_of(now: Standing) -> str:
     doubt = f"{now.missing} known objects are missing, {now.contradicting} closures contradict odometry"
     if now.elsewhere >= LOST_FROM:
         return f"elsewhere with a probability of {now.elsewhere:.2f}: {doubt}{known}"
+    if now.alike:
+        return f"two places of a map fit alike: {now.alike}{known}"
     if math.isnan(now.sigma_m):
         return f"no map of an earlier session is tied; {doubt}{known}"
     return f"within {WITHIN_M} m with a probability of {now.probability:.2f}, sigma {now.sigma_m:.2f} m; {doubt}{known}"

@@ -158,8 +158,7 @@ REFUSALS = {
     ),
     "places_alike": ReasonText(
         "another place of the map fits as well",
-        "Equal places are distinguished by what differs in them. Look where the detail says, or go on until something "
-        "else is in sight.",
+        "Equal places are distinguished by what differs in them. Go on until something that differs is in sight.",
         ("registrar.odometry_drift",),
         (("registrar/rivalry.py", "LEAST_LEAD"), ("registration/score/differing_parts.py", "OTHER")),
     ),

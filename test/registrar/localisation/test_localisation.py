@@ -218,3 +218,16 @@ def test_objects_that_are_not_detected_never_make_it_lost() -> None:
         made = walk.go()
         walk.here._weigh([(place, Look.NOTHING) for place, _ in walk.here.expect(made, hidden)], made.stamp_ns)
     assert walk.now.state is State.TRACKING
+
+
+def test_places_that_fit_alike_leave_it_ambiguous_until_a_closure_to_a_map_or_another_session() -> None:
+    walk = Walk()
+    made = walk.go()
+    walk.here.set_alike("nothing decides")
+    walk.here.set_alike("")  # a keyframe that fits no place
+    assert walk.now.state is State.AMBIGUOUS and "nothing decides" in walk.now.reason
+    walk.close(made, np.eye(4))
+    assert walk.now.state is not State.AMBIGUOUS
+    walk.here.set_alike("nothing decides")
+    walk.here.expect(replace(keyframe(90, 900.0, (), NOW + 1), by_odometry=True), [])
+    assert walk.now.state is not State.AMBIGUOUS

@@ -40,6 +40,13 @@ def test_kidnapped_comes_first() -> None:
     assert state_of(now) is State.KIDNAPPED and reason_of(now) == "2 closures that agree"
 
 
+def test_places_that_fit_alike_leave_it_ambiguous_unless_it_is_elsewhere() -> None:
+    alike = standing(alike="0 keyframes speak for one place, 0 for the other")
+    assert state_of(alike) is State.AMBIGUOUS and state_of(alike._replace(sigma_m=math.nan)) is State.AMBIGUOUS
+    assert state_of(alike._replace(elsewhere=0.9)) is State.LOST
+    assert reason_of(alike) == "two places of a map fit alike: " + alike.alike + ", the last closure 3.0 s ago"
+
+
 def test_the_reason_has_the_numbers() -> None:
     assert "0.99" in reason_of(standing(sigma_m=0.15)) and "3.0 s ago" in reason_of(standing())
     assert "4 known objects are missing" in reason_of(standing(elsewhere=0.8, missing=4))
