@@ -83,7 +83,7 @@ class Means(NamedTuple):
 class Found(NamedTuple):
     """What the candidates of one keyframe came to, in the order in which they were tried.
 
-    ``alike`` says why nothing decides where it fits two places, and is empty elsewhere.
+    ``alike`` says why nothing decides where it fits two places of a map and closes with none, and is empty elsewhere.
     """
 
     accepted: list[Decision]
@@ -134,7 +134,8 @@ class Search:
         """What is left of all that was found where other places of the same maps fit as well."""
         for one in {d.target.session: d for d in reversed(found.accepted)}.values():  # the first of each map
             found = self._without_rivals_of(one, found, queue, rivalry)
-        return found
+        known = any(one.target.session != self._keyframe.session for one in found.accepted)
+        return found._replace(alike="") if known else found
 
     def _without_rivals_of(
         self, one: Decision, found: Found, queue: deque[CandidateKeyframe], rivalry: Rivalry
@@ -184,7 +185,7 @@ class Search:
                 target = self._means.store.keyframe(stored.keyframe_id)
             except StoreError:
                 continue
-            if may_rival(one, target, self._params):
+            if may_rival(self._keyframe, one, target, self._params):
                 tries -= 1
                 decision = (ask or self._try_candidate(stored))()
                 if isinstance(decision, Decision) and rivals(one, decision, self._params):

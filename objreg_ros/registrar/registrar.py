@@ -199,8 +199,7 @@ class Registrar:
         found = self._register(candidates, keyframe, track, budget) if candidates else self._none_alike(keyframe)
         believed = found.accepted if track.proven else []
         closures, named = self._remember(keyframe, sightings, believed, found, track)
-        if not closures:
-            track.localisation.set_alike(found.alike)
+        track.localisation.set_alike(found.alike)
         self._localise(keyframe, named, track, budget)
         outcome = Outcome(
             closures=closures,

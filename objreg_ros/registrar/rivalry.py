@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data.checked import Array
-from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.geometry import inverse, pose_error, transform
 from objreg_ros.registrar.closure import Decision
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.relocalisation import Relocalisation
@@ -26,6 +26,7 @@ LEAST_M, LEAST_DEG = 0.5, 30.0  # between poses that are two places, and more wh
 DEVIATIONS = 3.0  # of odometry
 LEAST_LEAD = 3  # keyframes by which one place leads, that decide
 LEAST_TIMES = 3.0  # as many as for the other; and the pixels of one keyframe
+SAME_SPOT_M = 0.3  # between objects that are one: who shows it shows no other place
 LEAST_PX = 25  # of a view, that speak for a place
 TIED_BY = 3  # closures that agree, to a map: one may be of the twin
 
@@ -141,9 +142,17 @@ def rivals(one: Decision, other: Decision, params: RegistrarParams) -> bool:
     return apart(one.target, T_one, other.target, T_other, params)
 
 
-def may_rival(one: Decision, stored: Keyframe, params: RegistrarParams) -> bool:
-    """Whether a stored keyframe shows another place than where a decision has the camera."""
-    return apart(one.target, one.candidate.T_target_source, stored, np.eye(4), params)
+def may_rival(source: Keyframe, one: Decision, stored: Keyframe, params: RegistrarParams) -> bool:
+    """Whether a stored keyframe shows another place than where a decision has the camera, and none of what is there."""
+    if not apart(one.target, one.candidate.T_target_source, stored, np.eye(4), params):
+        return False
+    here, there = _objects(source, T_map_camera(one)), _objects(stored, _pose_of(stored))
+    return not bool((np.linalg.norm(here[:, None] - there[None], axis=2) < SAME_SPOT_M).any())
+
+
+def _objects(keyframe: Keyframe, T_map_camera: Array) -> Array:
+    """The middles (N, 3) of its objects in a map."""
+    return np.asarray(transform(T_map_camera, np.reshape([one.centroid for one in keyframe.objects], (-1, 3))))
 
 
 def place_of(source: Keyframe, one: Decision) -> Place:

@@ -276,7 +276,7 @@ SCENARIOS: dict[str, Callable[[Random, int], Plot]] = {
     "days": _days,
     "twins": _twins,
 }
-OF_ONE_DAY = tuple(name for name in SCENARIOS if name != "days")
+OF_ONE_DAY = tuple(name for name in SCENARIOS if name not in ("days", "twins"))
 """What training draws from."""
 
 

@@ -24,7 +24,7 @@ def test_a_recording_is_cut_where_the_camera_goes_from_one_place_to_the_other() 
 def test_what_differs_is_seen_from_near_by_and_in_the_picture() -> None:
     from twins import shows
 
-    book = twins_of(0)
+    book = twins_of(104)
     ahead = moved(book.spots[0][0], book.spots[0][1], book.spots[0][2] - 1.0)  # it looks up at it
     assert shows(scene_view(), ahead, book, 0) and not shows(scene_view(), ahead, book, 1)
     assert not shows(scene_view(), moved(MIDDLE_X, 0.0, book.spots[0][2] - 5.0), book, 0)

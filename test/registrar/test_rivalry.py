@@ -48,11 +48,18 @@ def painted(there: Keyframe, shade: int) -> Keyframe:
 
 
 def test_poses_farther_apart_than_odometry_errs_are_of_two_places() -> None:
-    assert rivals(ONE, OTHER, PARAMS) and may_rival(ONE, THERE, PARAMS)
+    assert rivals(ONE, OTHER, PARAMS) and may_rival(new(), ONE, THERE, PARAMS)
     back = Decision(target=THERE, candidate=candidate(moved(-AWAY_M)))  # the same place from there
     assert not rivals(ONE, back, PARAMS)
     drifted = replace(THERE, travelled=70.0)
     assert not apart(HERE, np.eye(4), drifted, np.eye(4), PARAMS)
+
+
+def test_a_keyframe_from_afar_that_shows_the_same_things_is_of_the_same_place() -> None:
+    afar = stored(2, -3.0, 7.0)
+    assert may_rival(new(), ONE, afar, PARAMS)
+    shows = replace(afar, objects=keyframe(2, 2, (box("cup", (3.0, 0.0, 1.0)),)).objects)
+    assert not may_rival(new(), ONE, shows, PARAMS)
 
 
 def test_of_two_sessions_nothing_is_known() -> None:

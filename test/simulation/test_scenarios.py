@@ -119,4 +119,4 @@ def test_a_third_of_the_things_stand_elsewhere_on_the_second_of_two_days() -> No
 
 
 def test_training_draws_from_scenarios_of_one_day() -> None:
-    assert set(SCENARIOS) - set(scenarios.OF_ONE_DAY) == {"days"}
+    assert set(SCENARIOS) - set(scenarios.OF_ONE_DAY) == {"days", "twins"}
