@@ -21,7 +21,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import replace
@@ -49,6 +49,7 @@ from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.candidate_search import Budget, Means, Search
 from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.relocalisation import Relocalisation
@@ -108,7 +109,7 @@ def visit(frames: Sequence[Frame], truth: Truth, twins: Twins, params: Registrar
     closures: list[LoopClosure] = []
     views = {frame.stamp_ns: frame.view for frame in frames}
     with closing(Registrar(params)) as registrar:
-        for outcome in [*(registrar.process(frame) for frame in begun_anew(list(frames))), registrar.finish()]:
+        for outcome in outcomes(registrar, frames):
             closures += [one for one in outcome.closures if one.from_session != one.to_session]
             refused += sum(one.reason is Reason.ALIKE for one in outcome.rejected)
             if outcome.keyframe_ns is not None:
@@ -128,6 +129,12 @@ def visit(frames: Sequence[Frame], truth: Truth, twins: Twins, params: Registrar
         "refused_as_alike": int(refused),
         "known": last is not None and last not in wrong,
     }
+
+
+def outcomes(registrar: Registrar, frames: Sequence[Frame]) -> Iterator[Outcome]:
+    """Those of each frame and of the end, as they come."""
+    yield from (registrar.process(frame) for frame in begun_anew(list(frames)))
+    yield registrar.finish()
 
 
 def is_right(closure: LoopClosure, truth: Truth) -> bool:
