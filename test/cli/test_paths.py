@@ -25,6 +25,7 @@ NAMES_NO_FILE = {
     "scheduler",
     "what",
     "form",
+    "ids",
     *("first", "second"),  # times of pair
     "sha256",
     "intrinsics",

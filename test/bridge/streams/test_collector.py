@@ -28,7 +28,8 @@ from objreg_ros.registrar.diagnostics import RegistrarDiagnostics
 NAMES = {0: "cup", 7: "tv"}
 REGISTRAR = RegistrarDiagnostics(
     keyframes=5, objects=9, landmarks=4, sessions=1, closures=0, unsearched=0, forgotten=0, waiting_keyframes=0,
-    waiting_poses=0, without_odometry=0, constraints=0, confirmed=0, rejected={"no_candidate": 3},
+    waiting_poses=0, without_odometry=0, constraints=0, confirmed=0, rejected={"no_candidate": 3}, vetoed=0,
+    localisation="", withdrawn=0,
 )  # fmt: skip
 BOOKS = Balance(10, 6, 1, {"overtaken": 3}, {"image": 2}, {"total": (10.0, 20.0)})
 
