@@ -136,7 +136,17 @@ setup(
         "docs": ["mkdocs-material>=9.5", "mkdocstrings-python>=1.10"],
         # The real ROS 2 Jazzy as wheels, for machines without a ROS installation.
         "ros": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
-        "test": ["hypothesis", "mypy", "onnx", "pytest", "pytest-xdist", "ruff", "selenium>=4.11", "small_gicp>=1.0"],
+        "test": [
+            "axe-core-python",
+            "hypothesis",
+            "mypy",
+            "onnx",
+            "pytest",
+            "pytest-xdist",
+            "ruff",
+            "selenium>=4.11",
+            "small_gicp>=1.0",
+        ],
     },
     entry_points={
         "console_scripts": [

@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.resources import files
 from typing import Any
 
 import pytest
@@ -28,3 +29,18 @@ def chromium(*words: str) -> Iterator[Any]:
         yield opened
     finally:
         opened.quit()
+
+
+AXE = """const done = arguments[0];
+axe.run({exclude: ['.js-plotly-plot']}, {resultTypes: ['violations']}).then((all) => done(all.violations))"""
+
+
+def violations(browser: Any) -> list[str]:
+    """What axe-core finds wrong with the page for those who see little or use no mouse, each with a place.
+
+    What plotly makes is left out.
+    """
+    pytest.importorskip("axe_core_python", reason="axe-core-python is not installed")
+    browser.set_script_timeout(60)
+    browser.execute_script(files("axe_core_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
+    return [f"{one['id']}: {one['nodes'][0]['target']}" for one in browser.execute_async_script(AXE)]

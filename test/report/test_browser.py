@@ -14,7 +14,7 @@ from objreg_tools.report.page import page
 from objreg_tools.report.run.run_summary import RunSummary
 from report.run.test_thumbnails import Wall
 
-from .chromium import chromium
+from .chromium import chromium, violations
 from .runs import TRUTH, summary
 
 WEBGL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # 3D without a graphics card
@@ -161,3 +161,12 @@ def test_nothing_is_wider_than_a_telephone_and_nothing_went_wrong(browser: Any) 
     letter = browser.execute_script(f"{size} return 12 * box.clientWidth / box.viewBox.baseVal.width")
     assert letter >= 10, "letters of a drawing in px"
     assert [row for row in browser.get_log("browser") if ADVICE not in row["message"]] == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [TELEPHONE["width"], 1280])
+def test_axe_finds_nothing_wrong_with_the_page(browser: Any, width: int, scheme: str) -> None:
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {**TELEPHONE, "width": width})
+    features = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    assert violations(browser) == []
