@@ -44,7 +44,7 @@ def scraped(address: str) -> dict[tuple[str, str], float]:
 
 def test_a_graph_that_runs_is_measured_until_ctrl_c(fresh: Graph, tmp_path: Path) -> None:
     simulate(
-        tmp_path / "bag", "loop", 1, 90, 15.0, sensors_of(camera_of("kinect", "320x240"), stress=False, settings=())
+        tmp_path / "bag", "orbit", 1, 50, 15.0, sensors_of(camera_of("kinect", "320x240"), stress=False, settings=())
     )
     for stage in ("detector", "segmenter", "registrar"):
         fresh.start(stage, stage, "-p reliable:=true", *(["-p model:=objreg_ssd.onnx"] if stage == "detector" else []))
