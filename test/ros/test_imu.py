@@ -10,6 +10,7 @@ from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_msgs.msg import Header
 
 from objreg_ros.bridge.messages import to_msg
+from objreg_ros.data.checked import Array
 from objreg_ros.data.images import Detections
 from objreg_ros.sensor import gravity_sigma_deg
 
@@ -58,6 +59,13 @@ def see(graph: Graph, stamp_ns: int) -> str:
     return graph.answer("segmenter", stamp_ns)
 
 
+def gravity_of(graph: Graph, count: int) -> Array:
+    """The gravity of the newest of so many frames."""
+    graph.wait_for(lambda: len(graph.received["gravity"]) == count, what="gravity")
+    vector = graph.received["gravity"][-1].vector
+    return np.array([vector.x, vector.y, vector.z])
+
+
 def test_a_segmenter_tells_the_gravity_that_an_imu_feels_whatever_else_the_imu_says(running: Graph) -> None:
     tilt = np.radians(20.0)
     felt = (9.81 * np.sin(tilt), 0.0, 9.81 * np.cos(tilt))  # the camera looks up by 20 degrees
@@ -69,11 +77,12 @@ def test_a_segmenter_tells_the_gravity_that_an_imu_feels_whatever_else_the_imu_s
         running.publish("imu", imu(stamp_ns, hostile or felt))
         if k == 80:
             running.publish("imu", imu(start, (0.0, 0.0, -9.81)))  # late
-    assert see(running, start + SECOND) == "published"
-    running.wait_for(lambda: len(running.received["gravity"]) == 2, what="gravity")
-    vector = running.received["gravity"][-1].vector
-    falls = np.array([vector.x, vector.y, vector.z])
-    confidence = float(np.linalg.norm(falls))
+    for later in range(9):  # a busy machine may read the IMU after the first picture
+        assert see(running, start + SECOND + later * SECOND // 10) == "published"
+        falls = gravity_of(running, 2 + later)
+        confidence = float(np.linalg.norm(falls))
+        if confidence > 0:
+            break
     assert falls / confidence == pytest.approx([0.0, np.cos(tilt), -np.sin(tilt)], abs=1e-3)
     assert gravity_sigma_deg(confidence) < 2.5
 
