@@ -188,6 +188,16 @@ def _compared(
     return path.name, compare(path, asked, kept)
 
 
+def paths_of(
+    recordings: Sequence[Path], scenarios: Sequence[tuple[str, int]], frames: int, keep: Path
+) -> list[Callable[[], Path]]:
+    """What gives the path of each recording; simulated ones are made then, and kept. UsageError where there is none."""
+    if not recordings and not scenarios:
+        raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
+    made = [partial(simulated, keep, name, seed, frames) for name, seed in scenarios]
+    return [*(partial(Path, path) for path in recordings), *made]
+
+
 @click.command()
 @click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path))
 @click.option(
@@ -233,16 +243,13 @@ def main(
 ) -> None:
     """Compare loop closure on RECORDINGS that have ground truth."""
     options |= quick_values(context, quick, QUICK if recordings else QUICK | {"scenarios": QUICK_STORY})
-    told = plans(options["scenarios"])
-    if not recordings and not told:
-        raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
+    scenarios = plans(options["scenarios"])
     detector = detector_of(options["model"], options["threshold"])
     asked = Asked(
         detector, options["names"], options["candidates"], options["seed"], options["drift"], options["jitter"]
     )
-    paths = [partial(Path, path) for path in recordings]
-    paths += [partial(simulated, keep, *plan, options["frames"]) for plan in told]
-    names = [*(path.name for path in recordings), *(f"{name}_{seed}" for name, seed in told)]
+    paths = paths_of(recordings, scenarios, options["frames"], keep)
+    names = [*(path.name for path in recordings), *(f"{name}_{seed}" for name, seed in scenarios)]
     _require_own_names(names)
     work = partial(_compared, asked=asked, frames=options["frames"], keep=keep, again=again)
     rows: dict[str, dict[str, Any]] = {}

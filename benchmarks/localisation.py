@@ -24,7 +24,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -32,7 +31,7 @@ from typing import Any
 import click
 import cv2
 import numpy as np
-from closure import plans, simulated
+from closure import paths_of, plans
 from command_line import quick_values
 from sessions import NEAR_M, Earlier, begun_anew, objects_of, remember
 from sources import detector_of, read_source
@@ -271,12 +270,8 @@ def main(
 ) -> None:
     """Measure and print; the figures are written after every recording."""
     options |= quick_values(context, quick, QUICK if recordings else QUICK | {"scenarios": ("loop:0",)})
-    asked = plans(options["scenarios"])
-    if not recordings and not asked:
-        raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     cv2.setNumThreads(1)
-    paths = [partial(Path, path) for path in recordings]
-    paths += [partial(simulated, keep, *plan, options["frames"]) for plan in asked]
+    paths = paths_of(recordings, plans(options["scenarios"]), options["frames"], keep)
     tallies: dict[str, Tally] = {}
     click.echo(HEAD)
     for make in paths:

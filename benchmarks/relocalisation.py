@@ -25,7 +25,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -33,7 +32,7 @@ import click
 import cv2
 import days
 import numpy as np
-from closure import plans, simulated
+from closure import paths_of, plans
 from command_line import quick_values
 from sessions import LATER_NS, Earlier, begun_anew, remember
 from sources import Source, detector_of, read_source
@@ -178,12 +177,8 @@ def main(
 ) -> None:
     """Measure and print; the figures are written after every recording."""
     options |= quick_values(context, quick, QUICK if recordings else QUICK | {"scenarios": ("loop:0",)})
-    told = plans(options["scenarios"])
-    if not recordings and not told:
-        raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     cv2.setNumThreads(1)
-    paths = [partial(Path, path) for path in recordings]
-    paths += [partial(simulated, keep, *plan, options["frames"]) for plan in told]
+    paths = paths_of(recordings, plans(options["scenarios"]), options["frames"], keep)
     rows: dict[str, list[dict[str, Any]]] = {}
     asked = asked_of(options["by_days"], options["starts"])
     click.echo(asked.head)

@@ -33,8 +33,8 @@ def test_a_later_session_begins_long_after_at_an_upright_origin() -> None:
     from sessions import LATER_NS, begun_anew
 
     level = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.array([3.0, 4.0, 1.0]))  # looks along x, z is up
-    told = [replace(frame(k, (CUP,)), T_odom_camera=DRIFT @ level @ moved(0.0, 0.0, k)) for k in range(2)]
-    first, second = begun_anew(told)
+    frames = [replace(frame(k, (CUP,)), T_odom_camera=DRIFT @ level @ moved(0.0, 0.0, k)) for k in range(2)]
+    first, second = begun_anew(frames)
     assert first.stamp_ns == LATER_NS and first.T_odom_camera is not None and second.T_odom_camera is not None
     assert np.allclose(first.T_odom_camera[:3, 3], 0.0) and np.allclose(first.T_odom_camera[:3, 2], [1, 0, 0])
     assert np.allclose(inverse(first.T_odom_camera) @ second.T_odom_camera, moved(0.0, 0.0, 1.0))

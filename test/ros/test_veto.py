@@ -60,32 +60,32 @@ def test_a_vetoed_closure_leaves_the_map_is_not_found_again_and_comes_back(fresh
     fresh.wait_for(lambda: {"/mapper", "/registrar"} <= set(fresh.counters), START_S, "the nodes")
     drive(fresh, (10, HERE), (13, AWAY), (40, BESIDE), (43, AWAY), (46, BESIDE))
     fresh.wait_for(lambda: bool(fresh.received["loop_closures"]), what="a closure")
-    told: dict[str, Any] = {}
+    closures: dict[str, Any] = {}
 
     def all_are_kept() -> bool:  # the rest of them may come after the first
-        told.update((one.id, one) for one in fresh.received["loop_closures"])
-        return count(fresh, "constraints kept") == len(told)
+        closures.update((one.id, one) for one in fresh.received["loop_closures"])
+        return count(fresh, "constraints kept") == len(closures)
 
     fresh.wait_for(all_are_kept, what="the closures in the map")
 
-    answer = call(fresh, services.Veto, "registrar/veto", ids=[*told, "no closure"])
+    answer = call(fresh, services.Veto, "registrar/veto", ids=[*closures, "no closure"])
     assert not answer.success and "no closure" in answer.message
-    answer = call(fresh, services.Veto, "registrar/veto", ids=list(told))
+    answer = call(fresh, services.Veto, "registrar/veto", ids=list(closures))
     assert answer.success, answer.message
-    fresh.wait_for(lambda: count(fresh, "constraints retracted") == len(told), what="the retraction in the mapper")
+    fresh.wait_for(lambda: count(fresh, "constraints retracted") == len(closures), what="the retraction in the mapper")
     fresh.wait_for(lambda: count(fresh, "constraints kept") == 0, what="the map without the closures")
-    gone = fresh.received["loop_closures"][len(told) :]
-    assert {one.id for one in gone} == set(told) and all(one.retracted for one in gone)
+    gone = fresh.received["loop_closures"][len(closures) :]
+    assert {one.id for one in gone} == set(closures) and all(one.retracted for one in gone)
 
     drive(fresh, (49, BESIDE), (52, AWAY))
-    before = [one for one in fresh.received["loop_closures"] if not one.retracted and one.id not in told]
+    before = [one for one in fresh.received["loop_closures"] if not one.retracted and one.id not in closures]
     for one in map(closures_msg.read_loop_closure, before):  # other revisits may close, but not with a withdrawn pose
-        for old in map(closures_msg.read_loop_closure, told.values()):
+        for old in map(closures_msg.read_loop_closure, closures.values()):
             degrees, centimetres = pose_error(one.T_from_to, old.T_from_to)
             assert one.from_ns != old.from_ns or degrees > 2.0 or centimetres > 5.0
 
-    answer = call(fresh, services.Veto, "registrar/veto", ids=list(told), undo=True)
+    answer = call(fresh, services.Veto, "registrar/veto", ids=list(closures), undo=True)
     assert answer.success, answer.message
-    fresh.wait_for(lambda: count(fresh, "constraints kept") >= len(told), what="the closures in the map again")
-    back = [one for one in fresh.received["loop_closures"] if one.id in told][2 * len(told) :]
-    assert {one.id for one in back} == set(told) and not any(one.retracted for one in back)
+    fresh.wait_for(lambda: count(fresh, "constraints kept") >= len(closures), what="the closures in the map again")
+    back = [one for one in fresh.received["loop_closures"] if one.id in closures][2 * len(closures) :]
+    assert {one.id for one in back} == set(closures) and not any(one.retracted for one in back)

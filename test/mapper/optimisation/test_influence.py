@@ -41,10 +41,10 @@ def test_the_cost_without_some_is_that_in_a_map_without_them(gone: list[int]) ->
     inside = [edge(0, 9, 0.01), edge(3, 11, 0.1), edge(2, 10, -0.05), edge(2, 9, -0.04)]
     newest = edge(1, 8, 0.2)
     graph, poses = solved(inside)
-    told = Influence.of(graph, poses, joined([*inside, newest]), [4, *range(4)]).expected_cost(4, gone)
+    stated = Influence.of(graph, poses, joined([*inside, newest]), [4, *range(4)]).expected_cost(4, gone)
     without, there = solved([closure for k, closure in enumerate(inside) if k not in gone])
     known = Influence.of(without, there, newest, [0]).expected_cost(0)
-    assert told == pytest.approx(known, rel=0.05)
+    assert stated == pytest.approx(known, rel=0.05)
 
 
 def test_a_closure_costs_more_where_the_map_knows_better() -> None:
@@ -58,12 +58,12 @@ def test_a_closure_costs_more_where_the_map_knows_better() -> None:
 def test_what_the_rest_costs_less_is_told(gone: list[int]) -> None:
     inside = [edge(0, 9, 0.01), edge(3, 11, 0.1), edge(2, 10, -0.05), edge(2, 9, -0.04)]
     graph, poses = solved(inside)
-    told = Influence.of(graph, poses, joined(inside), list(range(4))).relief(gone)
+    stated = Influence.of(graph, poses, joined(inside), list(range(4))).relief(gone)
     rest = [closure for k, closure in enumerate(inside) if k not in gone]
     _, there = solved(rest)
     odometry = joined([edge(k, k + 1, sigma=0.1) for k in range(COUNT - 1)])
     before = squared_residuals(poses, odometry.joined(joined(inside))).sum()
-    assert told == pytest.approx(
+    assert stated == pytest.approx(
         before - squared_residuals(there, odometry.joined(joined(rest))).sum(), rel=0.05, abs=0.1
     )
 

@@ -23,10 +23,16 @@ GONE = Row("<c>", "/c", error="no such <file>")
 
 
 def test_sums_are_over_all_and_false_ones_where_truth_tells() -> None:
-    told = totals([GOOD, BLIND, GONE])
-    assert (told["recordings"], told["failed"], told["frames"], told["constraints"], told["false"]) == (3, 1, 10, 6, 1)
+    summed = totals([GOOD, BLIND, GONE])
+    assert (summed["recordings"], summed["failed"], summed["frames"], summed["constraints"], summed["false"]) == (
+        3,
+        1,
+        10,
+        6,
+        1,
+    )
     assert "false" not in totals([BLIND]) and "revisits" not in totals([BLIND])
-    assert told["revisits"] == 2
+    assert summed["revisits"] == 2
 
 
 def test_revisits_have_a_column_of_their_own_beside_constraints() -> None:

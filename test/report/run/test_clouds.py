@@ -68,8 +68,8 @@ def test_a_moment_without_a_picture_on_the_page_has_no_cloud() -> None:
 
 
 def test_a_pair_has_its_pose_and_a_moment_of_two_pairs_is_kept_once() -> None:
-    told = {**summary(), "constraints": [closure(5, 65), closure(5, 66)]}
-    made = clouds(pairs_of(RunSummary.of("walk", told, TRUTH)), Wall(), EVERY)
+    run = {**summary(), "constraints": [closure(5, 65), closure(5, 66)]}
+    made = clouds(pairs_of(RunSummary.of("walk", run, TRUTH)), Wall(), EVERY)
     assert len(made.moments) == 3 and list(made.poses) == ["c0", "c1"] and made.lacking == ""
     expected = np.linalg.inv(TRUE[5]) @ TRUE[65]
     assert np.allclose(np.reshape(made.poses["c0"], (3, 4)), expected[:3], atol=1e-5)
@@ -77,8 +77,8 @@ def test_a_pair_has_its_pose_and_a_moment_of_two_pairs_is_kept_once() -> None:
 
 def test_a_refusal_has_clouds_where_it_has_a_pose() -> None:
     posed = {**refusal("texture_disagrees", 9, 99), "T_from_to": np.eye(4).tolist()}
-    told = {**summary(), "refusals": [refusal("texture_disagrees", 3, 70), posed]}
-    assert list(clouds(pairs_of(RunSummary.of("walk", told, TRUTH)), Wall(), EVERY).poses) == [
+    run = {**summary(), "refusals": [refusal("texture_disagrees", 3, 70), posed]}
+    assert list(clouds(pairs_of(RunSummary.of("walk", run, TRUTH)), Wall(), EVERY).poses) == [
         "c0",
         "c1",
         "c2",

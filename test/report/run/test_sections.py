@@ -21,14 +21,14 @@ from report.test_packed import unzipped
 FINDING = {"what": "No image was read.", "cause": "All <malformed>.", "todo": "objreg inspect x", "anchor": "no-images"}
 
 
-def view(told: dict[str, Any], truth: Truth = TRUTH) -> dict[str, Any]:
-    return view_of_run(RunSummary.of("walk", told, truth), None)
+def view(of_run: dict[str, Any], truth: Truth = TRUTH) -> dict[str, Any]:
+    return view_of_run(RunSummary.of("walk", of_run, truth), None)
 
 
 def test_every_pair_has_a_row_with_its_numbers() -> None:
-    told = summary(false=True)
-    told["refusals"][1]["evidence"] = {"score": 0.31, "odds": -2.0}
-    rows = {row["key"]: row for row in view(told)["pairs"]["rows"]}
+    of_run = summary(false=True)
+    of_run["refusals"][1]["evidence"] = {"score": 0.31, "odds": -2.0}
+    rows = {row["key"]: row for row in view(of_run)["pairs"]["rows"]}
     assert len(rows) == 8 and rows["c4"]["name"] == "false" and round(rows["c4"]["centimetres"]) == 50
     assert (rows["r1"]["name"], rows["r1"]["score"], rows["r1"]["odds"]) == ("texture disagrees", 0.31, -2.0)
     assert rows["r0"]["centimetres"] is None
@@ -51,9 +51,9 @@ def test_findings_are_told_in_the_head_and_escaped() -> None:
 
 
 def test_a_run_with_findings_does_not_say_that_no_candidate_was_certain_enough() -> None:
-    told = {**summary(), "constraints": []}
-    assert view(told)["said"].endswith("no candidate was certain enough.")
-    assert view({**told, "findings": [FINDING]})["said"] == "No loop was closed."
+    of_run = {**summary(), "constraints": []}
+    assert view(of_run)["said"].endswith("no candidate was certain enough.")
+    assert view({**of_run, "findings": [FINDING]})["said"] == "No loop was closed."
     assert view({"frames": 0, "constraints": []})["said"] == "No loop was closed."
 
 
@@ -117,25 +117,25 @@ def test_the_pictures_of_a_pair_show_what_closed_it() -> None:
 
 
 def test_without_odometry_the_truth_is_drawn() -> None:
-    told = summary()
-    told["glimpses"] = [{**row, "T_odom_camera": None} for row in told["glimpses"]]
-    way = view(told)["trajectory"]
+    of_run = summary()
+    of_run["glimpses"] = [{**row, "T_odom_camera": None} for row in of_run["glimpses"]]
+    way = view(of_run)["trajectory"]
     assert "is the ground truth" in way["text"] and [mark for mark, _ in way["legend"]] == [
         "true",
         "accepted",
     ]
     assert 'data-pair="c0"' in way["drawing"]["wide"]
-    assert "neither odometry nor ground truth" in view(told, Truth([]))["trajectory"]["text"]
+    assert "neither odometry nor ground truth" in view(of_run, Truth([]))["trajectory"]["text"]
 
 
 def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_stretch() -> None:
-    told = summary()
-    rows, lost = told["glimpses"], len(told["glimpses"]) // 4
-    told["glimpses"] = [
+    of_run = summary()
+    rows, lost = of_run["glimpses"], len(of_run["glimpses"]) // 4
+    of_run["glimpses"] = [
         {**row, "T_odom_camera": None, "tracked": {"session": int(k >= lost), "T_session_camera": row["T_odom_camera"]}}
         for k, row in enumerate(rows)
     ]
-    way = view(told, Truth([]))["trajectory"]
+    way = view(of_run, Truth([]))["trajectory"]
     assert f"{len(rows) - lost} of {len(rows)} frames" in way["text"]
     assert way["legend"][0] == ("tracked", "our own tracking") and "line tracked" in way["drawing"]["wide"]
     assert way["scene"]["trajectories"][0]["name"] == "our own tracking"
@@ -144,8 +144,11 @@ def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_str
 def test_our_own_tracking_is_drawn_corrected_with_what_of_it_is_left_out() -> None:
     lost = tracked(begins=45)
     lost["constraints"] = []
-    for told, words in ((tracked(), "120 of 120 frames"), (lost, "45 frames in 1 more session are not: nothing ties")):
-        way = view(told)["trajectory"]
+    for of_run, words in (
+        (tracked(), "120 of 120 frames"),
+        (lost, "45 frames in 1 more session are not: nothing ties"),
+    ):
+        way = view(of_run)["trajectory"]
         assert words in way["text"] and "There is no odometry" in way["text"]
         assert ("tracked", "our own tracking") in way["legend"] and ("corrected", "corrected") in way["legend"]
         assert 'class="line tracked"' in way["drawing"]["wide"]
