@@ -82,17 +82,17 @@ def test_what_another_setup_or_lock_asked_for_is_not_taken_as_installed(checkout
     [
         (
             {"PYTHON_VERSION": "3.13.0"},
-            "--editable .[tools,paper,mapper,report,ros]",
+            "--editable .[tools,paper,mapper,report,batch,metrics,ros]",
             "no lock fits Python 3.13.0 on Linux x86_64",
         ),
         (
             {"SYSTEM": "Linux aarch64", "ROS_DISTRO": "jazzy"},
-            "--editable .[tools,paper,mapper,report] --constraint config/constraints.txt",
+            "--editable .[tools,paper,mapper,report,batch,metrics] --constraint config/constraints.txt",
             "no lock fits Python 3.12.0 beside a sourced ROS",
         ),
         (
             {"ROS_DISTRO": "jazzy"},
-            "--editable .[tools,paper,mapper,report] --constraint config/constraints.txt",
+            "--editable .[tools,paper,mapper,report,batch,metrics] --constraint config/constraints.txt",
             "no lock fits Python 3.12.0 beside a sourced ROS",
         ),
     ],
