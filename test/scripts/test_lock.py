@@ -12,7 +12,8 @@ import pytest
 HASHES = r"(?: \\\n    --hash=sha256:[0-9a-f]{64})+"
 PIN = re.compile(rf"^(?P<name>[a-z0-9.-]+)==(?P<version>\S+){HASHES}$", re.MULTILINE)
 PYTHONS = ("3.11", "3.12")
-RUN = ("ros", "tools", "paper", "mapper", "report", "batch", "metrics")  # the extras that scripts/bootstrap installs where there is no ROS
+# The extras that scripts/bootstrap installs where there is no ROS.
+RUN = ("ros", "tools", "paper", "mapper", "report", "batch", "metrics")
 TEST = ("test", "docs")  # those that it adds with --test
 
 
