@@ -19,7 +19,7 @@ from figure_topics.topic import QUICK, REPOSITORY, Topic, shared_folder
 
 OUT = REPOSITORY / "out/figures"
 STOP = threading.Event()  # set where the run is ended: what is running ends, too
-SEED = re.compile(r"--(?:first-)?seed (\d+)|[a-z-]+:(\d+(?:,\d+)*)")
+SEED = re.compile(r"--(?:first-)?seeds? (\d+(?:,\d+)*)|[a-z-]+:(\d+(?:,\d+)*)")
 
 
 class TopicError(Exception):

@@ -280,7 +280,8 @@ def main(context: click.Context, out: Path | None, keep: Path, quick: bool, **op
             )
         click.echo(line(f"{path.name} {rows[path.name]['kind']}", summary([rows[path.name]])))
         if out is not None:
-            out.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+            figures = {"total": summary(list(rows.values())), "recordings": rows}
+            out.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     click.echo(line("all of them", summary(list(rows.values()))))
 
 

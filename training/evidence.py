@@ -57,7 +57,7 @@ THRESHOLD = 0.4  # of detections
 
 
 @dataclass(frozen=True)
-class Told:
+class Plan:
     """A recording that is simulated."""
 
     scenario: str
@@ -111,10 +111,10 @@ class Rows:
         return rows
 
 
-def plans(first_seed: int) -> list[Told]:
+def plans(first_seed: int) -> list[Plan]:
     """Every scenario by every sensor, in every rig, each in a room of its own."""
     chosen = [(scenario, sensor, rig) for rig in RIGS for scenario in SCENARIOS for sensor in SENSORS]
-    return [Told(*one, first_seed + k) for k, one in enumerate(chosen)]
+    return [Plan(*one, first_seed + k) for k, one in enumerate(chosen)]
 
 
 class Recorder:
@@ -169,7 +169,7 @@ def rows_of(
         yield (*pose_error(one.T_target_source, T_true), refused, pair, rank, *readings)
 
 
-def gather(plan: Told) -> Rows:
+def gather(plan: Plan) -> Rows:
     """The rows of one recording, which is gone afterwards."""
     cv2.setNumThreads(1)
     camera = camera_of(SENSORS[plan.sensor][0], None)

@@ -4,6 +4,7 @@
     python -m training.likelihood gather --first-seed 8100 --out EVIDENCE     # 36 recordings, an hour on two cores
     python -m training.likelihood fit EVIDENCE --write
     python -m training.likelihood check OTHERS                 # recordings that were not fitted to
+    python -m training.likelihood fresh --first-seed 12100     # gather such ones and check them
 
 An additive logistic model: the logarithm of the odds is the sum of one function for each kind of evidence, piecewise
 linear, and monotone by bounds on its slopes. Right and false poses weigh the same in sum. `fit` leaves out one sensor
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import textwrap
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -29,7 +31,7 @@ from objreg_ros.registration.gate import weights as shipped
 from objreg_ros.registration.gate.kinds import KINDS
 from objreg_ros.registration.gate.likelihood import ODDS
 from objreg_tools.truth import FALSE, LOOSE
-from training.evidence import Rows, gather, plans
+from training.evidence import Plan, Rows, gather, plans
 
 PENALTY = 1e-3  # of squared weights: what the rows hardly constrain weighs little
 LARGEST = 8.0  # natural logarithm that one step of a weight may have
@@ -169,13 +171,15 @@ def show(table: Sequence[Mapping[str, float]], title: str) -> None:
         )
 
 
-def written(found: Fit, pairs: int, recordings: int) -> str:
-    """The source of `gate/weights.py`."""
+def written(found: Fit, pairs: int, recordings: Sequence[str]) -> str:
+    """The source of `gate/weights.py`; by the names of its recordings they can be made again."""
     lines = [
         "# SPDX-License-Identifier: Apache-2.0",
         '"""What each of the `kinds` of evidence weighs at its knots, in decimal logarithms; 0 is its average.',
         "",
-        f"Written by `training/likelihood.py`, of {pairs} pairs of keyframes in {recordings} simulated recordings.",
+        f"Written by `training/likelihood.py`, of {pairs} pairs of keyframes in {len(recordings)} simulated"
+        " recordings. Their names have scenario, seed, sensor and rig:",
+        *textwrap.wrap(", ".join(recordings), 118, break_on_hyphens=False),
         '"""',
         "",
         f"PRIOR = {found.prior}",
@@ -207,11 +211,29 @@ def main() -> None:
 @click.option("--processes", type=click.IntRange(min=1), default=2, show_default=True)
 def gather_command(first_seed: int, out: Path, processes: int) -> None:
     """Simulate rooms by every sensor, and write what the gate sees; what is there already is left as it is."""
+    gather_into(out, plans(first_seed), processes)
+
+
+def gather_into(out: Path, wanted: Sequence[Plan], processes: int) -> None:
+    """Write the rows of each recording that is wanted and not there."""
     out.mkdir(parents=True, exist_ok=True)
-    todo = [one for one in plans(first_seed) if not (out / f"{one.name}.npz").exists()]
+    todo = [one for one in wanted if not (out / f"{one.name}.npz").exists()]
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork")) as pool:
         for one, rows in zip(todo, tqdm(pool.map(gather, todo), total=len(todo), unit="recording"), strict=True):
             rows.save(out / f"{one.name}.npz")
+
+
+@main.command("fresh")
+@click.option("--first-seed", type=click.IntRange(min=0), required=True, help="One that was not fitted to.")
+@click.option("--every", type=click.IntRange(min=1), default=1, show_default=True, help="One of so many recordings.")
+@click.option("--processes", type=click.IntRange(min=1), default=2, show_default=True)
+@click.option("--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/odds"), show_default=True)
+@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path))
+def fresh_command(first_seed: int, every: int, processes: int, keep: Path, json_file: Path | None) -> None:
+    """Gather recordings, and judge them by the weights of the package."""
+    wanted = plans(first_seed)[::every]
+    gather_into(keep, wanted, processes)
+    check(Rows.joined([Rows.load(keep / f"{one.name}.npz") for one in wanted]), json_file)
 
 
 @main.command("fit")
@@ -235,7 +257,8 @@ def fit_command(folder: Path, write: bool, json_file: Path | None) -> None:
     table = reliability(rows, apart)
     show(table, f"{len(np.unique(rows.pair))} pairs, each by a fit that has not seen its sensor")
     if write:
-        WRITTEN.write_text(written(whole, len(np.unique(rows.pair)), len(parts)))
+        recordings = [path.stem for path in sorted(folder.glob("*.npz"))]
+        WRITTEN.write_text(written(whole, len(np.unique(rows.pair)), recordings))
     if json_file is not None:
         json_file.write_text(json.dumps({"sensors": result, "left_out": table}, indent=1))
 
@@ -245,7 +268,11 @@ def fit_command(folder: Path, write: bool, json_file: Path | None) -> None:
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path))
 def check_command(folder: Path, json_file: Path | None) -> None:
     """Judge FOLDER, which must not be what was fitted to, by the weights of the package."""
-    rows = Rows.joined(_parts(folder))
+    check(Rows.joined(_parts(folder)), json_file)
+
+
+def check(rows: Rows, json_file: Path | None) -> None:
+    """Print how true the odds of the package are of these rows."""
     table = reliability(rows, log_odds(SHIPPED, rows.readings))
     show(table, f"{len(np.unique(rows.pair))} pairs by the weights of the package")
     if json_file is not None:

@@ -16,7 +16,6 @@ QUICK, WHOLE = "quick", "whole"
 SHARED_PATHS = {
     "KITCHEN": "data/redkitchen_a",
     "RPY": "data/tum_fr1_rpy",
-    "EVIDENCE": "evidence",
     "COCO": "models/ssd_mobilenet_v1_coco_int8.onnx",
 }  # below $OBJREG_SHARED; they are not part of the project
 Values = dict[str, float | str]

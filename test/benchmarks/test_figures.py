@@ -295,6 +295,7 @@ def test_what_was_found_wrong_is_a_figure_too(
 def test_the_seeds_are_those_of_the_command(scripts: dict[str, ModuleType]) -> None:
     seeds_of = scripts["figure_run"].seeds_of
     assert seeds_of("x.py --seed 3 --simulate moved:1,2 --simulate loop:814:sensor=azure --rounds 5") == [3, 1, 2, 814]
+    assert seeds_of("x.py --seeds 103,104 --tries 10") == [103, 104]
 
 
 def test_an_unknown_topic_is_refused(scripts: dict[str, ModuleType]) -> None:

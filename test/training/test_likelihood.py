@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from objreg_ros.data.checked import Array
 from objreg_ros.registration.gate.kinds import KINDS
 from training import likelihood
-from training.evidence import Rows
+from training.evidence import Plan, Rows, plans
 from training.likelihood import accepted, balanced, begun_summary, fit, log_odds, main, reliability, steps_of, written
 
 COUNT = 4000
@@ -90,7 +90,7 @@ def test_the_false_ones_that_the_odds_foretell_are_those_that_come() -> None:
 
 def test_what_is_written_is_what_was_fitted() -> None:
     found, names = fit(told()), {}
-    exec(written(found, 7, 2), names)
+    exec(written(found, 7, ["loop_1_kinect_v1_plain", "moved_2_azure_kinect_rig"]), names)
     assert (names["PRIOR"], names["WEIGHTS"], names["UNKNOWN"]) == (found.prior, found.weights, found.unknown)
     assert "7 pairs of keyframes in 2 simulated recordings" in names["__doc__"]
 
@@ -112,3 +112,22 @@ def test_check_judges_by_the_weights_of_the_package_and_says_what_is_missing(tmp
     (tmp_path / "none").mkdir()
     done = CliRunner().invoke(main, ["check", str(tmp_path / "none")])
     assert done.exit_code == 1 and "expected files of `gather`, got none" in done.output
+
+
+def test_fresh_gathers_what_is_not_there_and_judges_only_what_it_was_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, other = plans(40)[::18]
+    told(1).save(tmp_path / f"{one.name}.npz")
+    told(3).save(tmp_path / "of_another_seed.npz")
+    gathered: list[Plan] = []
+
+    def into(folder: Path, wanted: list[Plan], processes: int) -> None:
+        assert folder == tmp_path and processes == 2
+        gathered.extend(plan for plan in wanted if not (folder / f"{plan.name}.npz").exists())
+        told(2).save(folder / f"{other.name}.npz")
+
+    monkeypatch.setattr(likelihood, "gather_into", into)
+    done = CliRunner().invoke(main, ["fresh", "--first-seed", "40", "--every", "18", "--keep", str(tmp_path)])
+    assert done.exit_code == 0 and f"{2 * COUNT} pairs by the weights of the package" in done.output
+    assert gathered == [other]
