@@ -20,7 +20,7 @@ def walk(folder: Path, first: Path) -> None:
     researcher.type("simulate", "second", *ROOM[:2], "--seed", "2", *ROOM[4:])
     recordings = (str(first), "second")
     done = researcher.type("batch", *recordings, "--out", "before", *FRAMES)
-    assert "2 recordings, 0 failed, 48 frames" in done.output
+    assert "recordings: 2, failed: 0, frames: 48" in done.output
     assert len([*(folder / "before").glob("*-*.html")]) == 2 and (folder / "before/report.html").is_file()
 
     _compare(researcher, recordings)

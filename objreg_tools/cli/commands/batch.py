@@ -174,7 +174,7 @@ def _print_summary(rows: Sequence[Row], out: Path) -> None:
             click.echo(f"{row.name:32} {row.error}" if row.error else _line(row))
             for finding in row.findings:
                 click.echo(f"  ! {finding['what']}")
-    sums = ", ".join(f"{count} {name}" for name, count in totals(rows).items())
+    sums = ", ".join(f"{name}: {count}" for name, count in totals(rows).items())
     click.echo(f"{sums}; look at {out / PAGE}")
 
 

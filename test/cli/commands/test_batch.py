@@ -58,7 +58,7 @@ def test_one_worker_and_two_give_the_same(words: list[object], tmp_path: Path) -
     with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
         one = batch(*words, "--out", tmp_path / "one", "--scheduler", cluster.scheduler_address)
     two = batch(*words, "--out", tmp_path / "two", "--workers", 2)
-    assert one.return_value == two.return_value == 0 and "2 recordings, 0 failed, 5 frames" in two.output
+    assert one.return_value == two.return_value == 0 and "recordings: 2, failed: 0, frames: 5" in two.output
     assert len(told(tmp_path / "one")) == 2 and told(tmp_path / "one") == told(tmp_path / "two")
     for name in ("constraints.parquet", "refusals.parquet"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
@@ -73,7 +73,7 @@ def test_what_is_done_is_not_done_again_unless_something_changed(
     assert [path.name for path in alone] == ["b", "a"] and "1 of 2 recordings are done already" in again.output
     changed = batch(first, *words[2:], *out, "--set", "registrar.seed=7", "--max-frames", 1)
     assert "! 1 were made otherwise and are done anew: max_frames, registrar.seed changed" in changed.output
-    assert len(alone) == 3 and "1 recordings, 0 failed, 1 frames" in changed.output
+    assert len(alone) == 3 and "recordings: 1, failed: 0, frames: 1" in changed.output
 
 
 def test_each_recording_has_its_page_and_one_that_is_gone_is_drawn_without_a_run(
@@ -157,7 +157,7 @@ def test_a_result_that_was_edited_is_made_anew_and_the_user_learns_of_it(
         file.write_text(json.dumps(edited))
         result = batch(*words[1:], "--out", tmp_path / "out")
         anew += 1
-        assert result.return_value == 0 and "1 recordings, 0 failed, 2 frames" in result.output
+        assert result.return_value == 0 and "recordings: 1, failed: 0, frames: 2" in result.output
         assert f"{file.name}: expected a result of a batch" in result.output and "it is made anew" in result.output
         assert len(alone) == anew and told(tmp_path / "out") == {
             file.name: {k: good[k] for k in good if k not in TIMES}
@@ -166,7 +166,7 @@ def test_a_result_that_was_edited_is_made_anew_and_the_user_learns_of_it(
 
 def test_a_recording_that_fails_stops_no_other(words: list[object], tmp_path: Path, alone: list[Path]) -> None:
     result = batch(tmp_path / "gone", *words[1:], "--out", tmp_path / "out")
-    assert result.return_value == 3 and "2 recordings, 1 failed, 2 frames" in result.output
+    assert result.return_value == 3 and "recordings: 2, failed: 1, frames: 2" in result.output
     table = pyarrow.parquet.read_table(tmp_path / "out/recordings.parquet").to_pylist()
     assert [(row["name"], row["frames"]) for row in table] == [("gone", 0), ("b", 2)] and "gone" in table[0]["error"]
     assert table[0]["error"] in result.output and "<h2>Failed</h2>" in (tmp_path / "out/report.html").read_text()
@@ -176,7 +176,7 @@ def test_two_recordings_of_one_name_have_their_own_results(
     words: list[object], tmp_path: Path, alone: list[Path]
 ) -> None:
     other = tum_folder(tmp_path / "elsewhere/b", frames=4)
-    assert "2 recordings, 0 failed, 6 frames" in batch(other, *words[1:], "--out", tmp_path / "out").output
+    assert "recordings: 2, failed: 0, frames: 6" in batch(other, *words[1:], "--out", tmp_path / "out").output
 
 
 def test_a_store_that_all_would_share_is_refused(words: list[object], tmp_path: Path) -> None:
