@@ -62,7 +62,7 @@ TOPICS = (
         script="benchmarks/start.py",
         quick="--rounds 3",
         whole="--rounds 5",
-        minutes=(0.4, 1),
+        minutes=(0.3, 1),
         rows=(
             Row("one", "all three nodes in one process until they listen", "{seconds} s, {mb} MB", _start, timed=True),
             Row("library", "the library with its first `register()`", "{seconds} s, {mb} MB", _library, timed=True),
@@ -73,9 +73,9 @@ TOPICS = (
         name="latency",
         title="Live at 30 Hz, four objects",
         script="benchmarks/latency.py --objects 4 --composed 1 --seed 0",
-        quick="--seconds 12",
+        quick="--seconds 30",
         whole="--seconds 40",
-        minutes=(1.5, 3),
+        minutes=(1.4, 3),
         rows=(
             Row(
                 "usage",
@@ -133,7 +133,7 @@ TOPICS = (
         script="benchmarks/attacks.py --first 0",
         quick="--seconds 60 --workers 1",
         whole="--seconds 900",
-        minutes=(2, 20),
+        minutes=(2.3, 20),
         rows=(
             Row(
                 "found",

@@ -82,7 +82,7 @@ TOPICS = (
         script="benchmarks/pairs.py RPY --model COCO --threshold 0.4 --lag-ms 30 --seed 1",
         quick="--wanted 25 --peers orb_pnp",
         whole="--wanted 200",
-        minutes=(0.8, 10),
+        minutes=(0.6, 10),
         rows=REAL_PAIRS,
         about="Half of the pairs could close. Wrong is at the stamps.",
     ),
@@ -92,7 +92,7 @@ TOPICS = (
         script="benchmarks/pairs.py KITCHEN --model COCO --seed 19",
         quick="--wanted 25 --peers orb_pnp",
         whole="--wanted 200",
-        minutes=(0.8, 10),
+        minutes=(0.5, 10),
         rows=REAL_PAIRS,
     ),
     Topic(
@@ -101,7 +101,7 @@ TOPICS = (
         script="benchmarks/strangers.py KITCHEN RPY --model COCO --threshold 0.4 --frames 80 --seed 1",
         quick="--pairs 300",
         whole="--pairs 10000 --simulate moved:811 --simulate loop:814:sensor=realsense_d435",
-        minutes=(1, 20),
+        minutes=(0.8, 20),
         rows=(
             Row(
                 "accepted",
@@ -117,7 +117,7 @@ TOPICS = (
         script="benchmarks/registration.py --seed 9521",
         quick="--quick",
         whole="--reps 1 --negatives 120 --every 90",
-        minutes=(1.5, 30),
+        minutes=(0.8, 30),
         rows=(
             Row(
                 "right", "right within 5° and 2 cm", "{clean}; with stress {stress}", lambda raw: _both(raw, "success")
@@ -133,7 +133,7 @@ TOPICS = (
         script="benchmarks/paper.py --seed 20",
         quick="--quick",
         whole="--seeds 3",
-        minutes=(0.8, 8),
+        minutes=(0.7, 8),
         rows=(
             Row("right", "right, by angle of view", "{ours} at {angles}; its ICP {founding}", _angles),
             Row(
@@ -153,7 +153,7 @@ TOPICS = (
         script="benchmarks/false_closures.py",
         quick="--frames 60 --simulate moved:1306:qvga:stress --simulate look-alikes:1310:qvga:stress",
         whole="--frames 400",
-        minutes=(1.5, 90),
+        minutes=(1.2, 90),
         rows=(
             Row(
                 "false",

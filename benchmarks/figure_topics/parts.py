@@ -97,7 +97,7 @@ TOPICS = (
         script="benchmarks/segmentation.py --seed 401",
         quick="--quick",
         whole="",
-        minutes=(1, 6),
+        minutes=(0.4, 6),
         rows=(
             Row(
                 "iou",
@@ -142,7 +142,7 @@ TOPICS = (
         script="benchmarks/mapper.py scale --seed 1",
         quick="--poses 4000 --closures 200",
         whole="",
-        minutes=(1, 40),
+        minutes=(0.8, 40),
         rows=(
             Row(
                 "closure",
@@ -159,7 +159,7 @@ TOPICS = (
         script="benchmarks/sensor.py --seed 31",
         quick="--frames 20",
         whole="--frames 60",
-        minutes=(1, 6),
+        minutes=(0.4, 6),
         rows=(
             Row(
                 "offset",
