@@ -170,7 +170,7 @@ TOPICS = (
         script="training/likelihood.py fresh --first-seed 12100 --keep KEEP",
         quick="--every 36",
         whole="",
-        minutes=(1.5, 60),
+        minutes=(1, 60),
         rows=tuple(
             Row(
                 f"least_{least}",

@@ -38,6 +38,7 @@ SET = {
         "a jitter of 3° and 4 cm",  # what its command asks for
         "70 to 180 degrees",
         "from 3 m and more",
+        "within 3 s of two of them",
         "After 20 s at rest, or 60 s of motion",
         "below 5 %, or within four deviations (three after 20 s)",
         "less than 10°",
