@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from objreg_ros.data.closures import LoopClosure, Reason, Rejected
 from objreg_ros.data.frames import Frame
@@ -76,12 +76,13 @@ class CameraTrack:
         unproven, self.unproven = [waiting.refused(refusal or waiting.refusal) for waiting in self.unproven], []
         return (*unproven, *self.confirmation.give_up(refusal))
 
-    def withdraw(self, closures: Iterable[LoopClosure], vetoes: Vetoes) -> tuple[Rejected, ...]:
+    def withdraw(self, closures: Sequence[LoopClosure], vetoes: Vetoes) -> tuple[Rejected, ...]:
         """Take back what these closures brought, and refuse what waits and says the same."""
         for closure in closures:
             if closure.from_session is not None:
                 self.thinning.withdraw(closure.from_session, closure.from_ns, closure.to_ns)
         self.relocalisation.withdraw(closures)
+        self.localisation.withdraw(vetoes)
         gone = [waiting for waiting in self.unproven if vetoes.cover_waiting(waiting)]
         self.unproven = [waiting for waiting in self.unproven if waiting not in gone]
         return (*(waiting.refused(VETOED) for waiting in gone), *self.confirmation.withdraw(vetoes))
@@ -92,6 +93,7 @@ class CameraTrack:
             self.thinning.accept(closure.from_session, closure.from_ns, closure.to_ns)
         if ends is not None:
             self.relocalisation.add_closure(closure, *ends)
+            self.localisation.admit(closure, *ends)
 
     def hold(self, decision: Decision, keyframe: Keyframe, named: Sequence[Sighting]) -> None:
         """Keep a pose that waits for other keyframes; ``named`` are the keyframe's sightings."""

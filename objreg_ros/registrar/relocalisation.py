@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import threading
 from collections import Counter, deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -88,14 +89,15 @@ class Relocalisation:
     """
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._last_ns = 0
         self._begin(-1, 0)
 
     def _begin(self, session: int, began_ns: int) -> None:
         """Forget everything: the frames from ``began_ns`` on are in odometry of their own."""
         self._session, self._began_ns = session, began_ns
-        self._ties: list[SessionTie] = []
+        self._came: list[SessionTie] = []  # all of them
+        self._ties: list[SessionTie] = []  # those that count
         self._received = Counter[int]()  # closures, by the earlier session
         self._camera: tuple[int, Array] | None = None  # the newest: stamp and T_odom_camera
         self._map: int | None = None  # the session in whose map the camera is
@@ -106,6 +108,7 @@ class Relocalisation:
         self._steps = deque([(began_ns, 0.0)], maxlen=MOST_STEPS)  # stamp, and the path until then
         self._path_until_tie = 0.0
         self._agreeing, self._target_ns, self._by_odometry = 0, 0, False
+        self._unfused: list[tuple[SessionTie, float]] = []  # ties that agree, and the path to each
 
     @property
     def newest_ns(self) -> int:
@@ -145,21 +148,43 @@ class Relocalisation:
                 self._go(source.stamp_ns, _pose_of(source))
             self._received[target.session] += 1
             tie = _tie(closure, source, target)
-            self._weigh(tie)
-            self._ties = [*self._ties, tie][-MOST:]
+            self._came = [*self._came, tie][-MOST:]
+            self._take_in(tie)
 
     def withdraw(self, closures: Iterable[LoopClosure]) -> None:
         """Answer as if these closures had never come."""
         gone = {(one.from_session, one.from_ns, one.to_session, one.to_ns) for one in closures}
         with self._lock:
-            kept = [tie for tie in self._ties if tie.moments not in gone]
-            if len(kept) == len(self._ties):
-                return
-            self._received -= Counter(tie.statement.target.session for tie in self._ties if tie.moments in gone)
-            self._map, self._ties = None, []
-            for tie in kept:
-                self._weigh(tie)
-                self._ties.append(tie)
+            left_out = [tie for tie in self._came if tie.moments in gone]
+            if left_out:
+                self._received -= Counter(tie.statement.target.session for tie in left_out)
+                self._came = [tie for tie in self._came if tie.moments not in gone]
+                self._renew([tie for tie in self._ties if tie.moments not in gone])
+
+    @contextmanager
+    def beginning_again(self) -> Iterator[list[SessionTie]]:
+        """Forget the answer, and give all ties that came, also of before the camera was taken elsewhere.
+
+        `take_in` counts them anew; no other thread sees what it is meanwhile.
+        """
+        with self._lock:
+            self._renew([])
+            yield self._came
+
+    def take_in(self, tie: SessionTie) -> None:
+        """Count a tie, after those of before."""
+        with self._lock:
+            self._take_in(tie)
+
+    def _take_in(self, tie: SessionTie) -> None:
+        self._weigh(tie)
+        self._ties = [*self._ties, tie][-MOST:]
+
+    def _renew(self, ties: Iterable[SessionTie]) -> None:
+        """Answer by these ties alone."""
+        self._map, self._ties = None, []
+        for tie in ties:
+            self._take_in(tie)
 
     def _weigh(self, tie: SessionTie) -> None:
         """Renew the answer with a tie, if it is believed."""
@@ -178,10 +203,17 @@ class Relocalisation:
             return
         self._map, self._agreeing, self._target_ns = target, 1 + len(agreeing), tie.statement.target.stamp_ns
         self._by_odometry = tie.by_odometry
-        here = tie.statement.source
-        T_map_here, self._covariance = fused([one.carried(here, way) for one, way in (*agreeing, (tie, 0.0))])
+        self._unfused = [*agreeing, (tie, 0.0)]
+
+    def _fuse(self) -> None:
+        """Average the ties that agree, if that is not done: who weighs many anew asks for few of the answers."""
+        if not self._unfused:
+            return
+        here = self._unfused[-1][0].statement.source
+        T_map_here, self._covariance = fused([one.carried(here, way) for one, way in self._unfused])
         self._T_map_odom = rigid(T_map_here @ inverse(here.T_session_camera))
         self._origin, self._path_until_tie = here.T_session_camera[:3, 3], self._path_until(here.stamp_ns)
+        self._unfused = []
 
     def begin_at(self, first_ns: int) -> None:
         """Forget ties to earlier sessions of keyframes before ``first_ns``: the camera was taken elsewhere by then.
@@ -189,31 +221,35 @@ class Relocalisation:
         What is left ties it anew, where that suffices.
         """
         with self._lock:
-            kept = [one for one in self._ties if one.statement.source.stamp_ns >= first_ns]
-            self._ties, self._map = [], None
-            for tie in kept:
-                self._weigh(tie)
-                self._ties = [*self._ties, tie]
+            self._renew([one for one in self._ties if one.statement.source.stamp_ns >= first_ns])
 
     @property
     def relocalised(self) -> Relocalised | None:
         """Where the newest frame's camera is; None where it is not known."""
         with self._lock:
-            if self._map is None or self._camera is None:
-                return None
-            stamp_ns, T_odom_camera = self._camera
-            T_map_camera = self._T_map_odom @ T_odom_camera
-            way = self._T_map_odom[:3, :3] @ (T_odom_camera[:3, 3] - self._origin)
-            return Relocalised(
-                stamp_ns=stamp_ns,
-                session=self._map,
-                target_ns=self._target_ns,
-                T_map_odom=self._T_map_odom,
-                T_map_camera=T_map_camera,
-                covariance=turned_about(self._covariance, way) + drift(self._path.travelled - self._path_until_tie),
-                closures=self._agreeing,
-                by_odometry=self._by_odometry,
-            )
+            return None if self._camera is None else self._where(*self._camera, self._path.travelled)
+
+    def relocalised_at(self, here: Standpoint) -> Relocalised | None:
+        """Where the camera was at an earlier keyframe of this session; None where it is not known."""
+        with self._lock:
+            return self._where(here.stamp_ns, here.T_session_camera, self._path_until(here.stamp_ns))
+
+    def _where(self, stamp_ns: int, T_odom_camera: Array, travelled: float) -> Relocalised | None:
+        """Where a camera is that odometry has come to after so many metres."""
+        if self._map is None:
+            return None
+        self._fuse()
+        way = self._T_map_odom[:3, :3] @ (T_odom_camera[:3, 3] - self._origin)
+        return Relocalised(
+            stamp_ns=stamp_ns,
+            session=self._map,
+            target_ns=self._target_ns,
+            T_map_odom=self._T_map_odom,
+            T_map_camera=self._T_map_odom @ T_odom_camera,
+            covariance=turned_about(self._covariance, way) + drift(travelled - self._path_until_tie),
+            closures=self._agreeing,
+            by_odometry=self._by_odometry,
+        )
 
     @property
     def reason(self) -> str:

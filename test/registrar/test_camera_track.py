@@ -5,15 +5,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 from registration.samples import SECOND, frame, keyframe
 
-from objreg_ros.data.closures import Reason
+from objreg_ros.data.closures import LoopClosure, Reason
+from objreg_ros.data.localisation import State
 from objreg_ros.keyframes.frame_window import Clock, SessionNumbers
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.camera_track import MOST_CAMERAS, CameraTracks, clock_refusals
+from objreg_ros.memory.veto import Veto
+from objreg_ros.registrar.camera_track import MOST_CAMERAS, CameraTrack, CameraTracks, clock_refusals
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.recollection import Recollection
+from objreg_ros.registrar.vetoes import Vetoes
 from objreg_ros.registration.keyframe import Keyframe
 
 PARAMS = RegistrarParams()
@@ -126,3 +130,27 @@ def test_what_the_other_camera_saw_before_the_clock_began_anew_stays_hidden_thou
     for seconds in (0.3, 20.4, 20.6):
         _goes_on(recollection, tracks, REAR, rear, seconds)
     assert tracks.of(REAR).hidden == {0}
+
+
+def test_a_veto_takes_the_tie_to_a_session_back_and_its_undo_brings_it_again() -> None:
+    track = CameraTrack(PARAMS, SessionNumbers())
+    earlier, now = (replace(keyframe(n, 10.0 * n, session=n), by_odometry=True) for n in (1, 2))
+    track.relocalisation.note_frame(frame(20.0, T_odom_camera=np.eye(4)), now.session)
+    track.localisation.expect(now, ())
+    closure = LoopClosure(
+        from_ns=earlier.stamp_ns,
+        to_ns=now.stamp_ns,
+        T_from_to=np.eye(4),
+        covariance=1e-4 * np.eye(6),
+        labels=(),
+        evidence={"odds": 5000.0},
+        from_session=earlier.session,
+        to_session=now.session,
+    )
+    track.add_closure(closure, now, earlier)
+    assert track.localisation.state(now.stamp_ns).state is State.SURE
+    track.withdraw((closure,), Vetoes([Veto(closure=closure)]))
+    state = track.localisation.state(now.stamp_ns)
+    assert state.state is State.TRACKING and state.closure is None and track.relocalisation.relocalised is None
+    track.admit(closure, (now, earlier))
+    assert track.localisation.state(now.stamp_ns).state is State.SURE

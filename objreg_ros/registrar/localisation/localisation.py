@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 import threading
+from collections import deque
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure, Relocalised
 from objreg_ros.data.localisation import LocalisationState
 from objreg_ros.memory.known import Last
@@ -26,6 +29,7 @@ from objreg_ros.registrar.localisation.places import places_of, shown_by, sigma_
 from objreg_ros.registrar.localisation.verdict import Standing, reason_of, state_of
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.relocalisation import ALONE_ODDS, Relocalisation, drift
+from objreg_ros.registrar.vetoes import Vetoes
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
 
@@ -39,8 +43,32 @@ CONTRADICTS = 0.5  # of right closures of a camera that is elsewhere, so many co
 AGREE = 10.0  # so much likelier do right poses of two keyframes agree than false ones, at least
 DOUBTFUL_ODDS = 0.01  # of being elsewhere, from which the session is searched without odometry
 RIVALS = 32  # poses that contradict odometry that are kept, the newest
+MOST_CAME = 256  # closures and such poses that are kept, the newest: a person may withdraw one
 EXPECTED = 1000  # landmarks, the newest, that are expected
 SHOWN_NS = 3_000_000_000  # for so long it is said that the camera was kidnapped: who looks once a second must see it
+
+
+class Came(NamedTuple):
+    """What a ``closure`` says, or a pose that was found without odometry, where that is None.
+
+    By odometry the camera turned ``turn_deg`` between the two keyframes.
+    """
+
+    statement: Statement
+    turn_deg: float
+    closure: LoopClosure | None
+
+    @property
+    def moments(self) -> tuple[int, int, int, int]:
+        """As those of `SessionTie`."""
+        target, source = self.statement.target, self.statement.source
+        return target.session, target.stamp_ns, source.session, source.stamp_ns
+
+    def is_withdrawn(self, vetoes: Vetoes) -> bool:
+        """Whether a person did: a closure itself, of poses those that say the same too."""
+        if self.closure is not None:
+            return self.closure in vetoes
+        return vetoes.covers(self.statement.source, self.statement.target, self.statement.T_target_source)
 
 
 class Localisation:
@@ -52,16 +80,23 @@ class Localisation:
         self._begin(-1, 0)
 
     def _begin(self, session: int, stamp_ns: int) -> None:
-        self._session, self._belief, self._familiar = session, Belief(), Familiar()
+        self._session, self._began_ns, self._familiar = session, stamp_ns, Familiar()
+        self._came = deque[Came](maxlen=MOST_CAME)
+        self._alike = ""
+        self._linked = True  # the newest keyframe, to what counts
+        self._forget_evidence()
+
+    def _forget_evidence(self) -> None:
+        """Believe what is believed of a camera of which nothing came yet."""
+        self._belief = Belief()
+        self._belief.wait(self._began_ns)
         self._missing: set[int] = set()  # landmarks
         self._rivals: list[Statement] = []  # that contradict odometry, since one that agrees
         self._before: Relocalised | None = None  # the tie before them
         self._closure: LoopClosure | None = None
         self._target_travelled = math.nan
-        self._alike = ""
-        self._linked = True  # the newest keyframe, to what counts
         self._agreed_ns = -1  # the newest keyframe of which a closure to an older place agrees with odometry
-        self._since_ns, self._moved_ns, self._kidnapped = stamp_ns, stamp_ns, ""
+        self._since_ns, self._moved_ns, self._kidnapped = self._began_ns, self._began_ns, ""
 
     @property
     def is_doubtful(self) -> bool:
@@ -129,33 +164,71 @@ class Localisation:
         if source.session == self._session != target.session:
             self._alike = ""
         odds = closure.evidence.get("odds", 1.0)
-        one = Statement(Standpoint.of(source), Standpoint.of(target), closure.T_from_to, odds, True)
-        self._state(one, source, target, closure)
+        self._add(source, target, closure.T_from_to, odds, closure)
 
     def add_rival(self, source: Keyframe, target: Keyframe, T_target_source: object, odds: float) -> None:
         """Take in a pose that was found without odometry, in the camera's own session."""
-        one = Statement(Standpoint.of(source), Standpoint.of(target), np.asarray(T_target_source), odds, True)
-        self._state(one, source, target, None)
+        self._add(source, target, np.asarray(T_target_source), odds, None)
 
-    def _state(self, one: Statement, source: Keyframe, target: Keyframe, closure: LoopClosure | None) -> None:
+    def _add(self, source: Keyframe, target: Keyframe, T: Array, odds: float, closure: LoopClosure | None) -> None:
         with self._lock:
-            if source.session != self._session or source.stamp_ns < self._moved_ns:
-                return
-            tied = self._tied_to(source, target)
-            if tied is None:
-                if target.session != source.session and self._tied() is None:  # the first: nothing to compare it with
-                    self._closure, self._target_travelled = closure, target.travelled
-                return
-            if self._rivals and source.session == target.session and target.stamp_ns >= self._rivals[0].source.stamp_ns:
-                return  # if the camera was taken away, both keyframes came after that
-            apart = difference(one, tied)
-            match says(apart, tied):
-                case Says.HERE:
-                    self._agrees(one, closure)
-                case Says.ELSEWHERE:
-                    self._contradicts(one)
-                case Says.BESIDE:
-                    pass
+            if source.session == self._session:
+                self._came.append(_came(source, target, T, odds, closure))
+                self._state(self._came[-1])
+
+    def withdraw(self, vetoes: Vetoes) -> None:
+        """Take back what a person withdrew, after the relocalisation did."""
+        with self._lock:
+            kept = [came for came in self._came if not came.is_withdrawn(vetoes)]
+            if len(kept) < len(self._came):
+                self._weigh_anew(kept)
+
+    def admit(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
+        """Take in a closure that holds again, after the relocalisation did."""
+        with self._lock:
+            if source.session == self._session:
+                came = _came(source, target, closure.T_from_to, closure.evidence.get("odds", 1.0), closure)
+                self._weigh_anew(sorted((*self._came, came), key=lambda one: one.statement.source.stamp_ns))
+
+    def _weigh_anew(self, kept: Sequence[Came]) -> None:
+        """Go through what came since the session began once more.
+
+        What views showed is left out: objects were looked for by the tie of then.
+        """
+        self._came = deque(kept, MOST_CAME)
+        self._forget_evidence()
+        with self._relocalisation.beginning_again() as came:
+            ties, names = {tie.moments: tie for tie in came}, {one.moments for one in self._came}
+            for moments in [
+                one for one in ties if one not in names
+            ]:  # of so long ago that only the relocalisation has them
+                self._relocalisation.take_in(ties.pop(moments))
+            for one in self._came:
+                self._belief.wait(one.statement.source.stamp_ns)
+                self._state(one)
+                if one.moments in ties:
+                    self._relocalisation.take_in(ties.pop(one.moments))
+
+    def _state(self, came: Came) -> None:
+        one, closure = came.statement, came.closure
+        source, target = one.source, one.target
+        if source.stamp_ns < self._moved_ns:
+            return
+        tied = self._tied_to(came)
+        if tied is None:
+            if target.session != source.session and self._tied_at(source) is None:  # the first: nothing to compare with
+                self._closure, self._target_travelled = closure, target.travelled
+            return
+        if self._rivals and source.session == target.session and target.stamp_ns >= self._rivals[0].source.stamp_ns:
+            return  # if the camera was taken away, both keyframes came after that
+        apart = difference(one, tied)
+        match says(apart, tied):
+            case Says.HERE:
+                self._agrees(one, closure)
+            case Says.ELSEWHERE:
+                self._contradicts(one)
+            case Says.BESIDE:
+                pass
 
     def _agrees(self, one: Statement, closure: LoopClosure | None) -> None:
         """A closure that says nothing else than odometry does; of what came shortly before it says nothing more."""
@@ -168,7 +241,7 @@ class Localisation:
 
     def _contradicts(self, one: Statement) -> None:
         """A closure that puts the camera elsewhere; two of them that agree have it taken there."""
-        self._before = self._before or self._relocalisation.relocalised
+        self._before = self._tied_at(one.source)
         is_first = one.source.stamp_ns not in {other.source.stamp_ns for other in self._rivals}
         self._rivals = [*self._rivals, one][-RIVALS:]
         same = in_agreement(self._rivals)
@@ -195,25 +268,29 @@ class Localisation:
         """The tie to a map, as it was before closures contradicted it."""
         return self._before or self._relocalisation.relocalised
 
+    def _tied_at(self, here: Standpoint) -> Relocalised | None:
+        """As `_tied`, where the camera was at a keyframe."""
+        return self._before or self._relocalisation.relocalised_at(here)
+
     def _tied_to_session(self, one: Statement) -> Tied | None:
         if one.target.session == one.source.session:
             return Tied(np.eye(4), 0.0, 0.0)
-        tied = self._tied()
+        tied = self._tied_at(one.source)
         return None if tied is None else Tied(tied.T_map_odom, 0.0, 0.0)
 
-    def _tied_to(self, source: Keyframe, target: Keyframe) -> Tied | None:
+    def _tied_to(self, came: Came) -> Tied | None:
         """What is believed of the source in the target's session; None where nothing is."""
+        source, target = came.statement.source, came.statement.target
         if source.session == target.session:
-            if not (source.by_odometry and target.by_odometry) or target.stamp_ns < self._since_ns:
+            if not came.statement.by_odometry or target.stamp_ns < self._since_ns:
                 return None
-            path, turn = abs(source.travelled - target.travelled), abs(source.turned - target.turned)
-            p = self._params
+            path, p = abs(source.travelled - target.travelled), self._params
             return Tied(
                 np.eye(4),
                 p.odometry_translation_noise + p.odometry_drift * path,
-                p.odometry_rotation_noise + p.odometry_rotation_drift * turn,
+                p.odometry_rotation_noise + p.odometry_rotation_drift * came.turn_deg,
             )
-        tied = self._tied()
+        tied = self._tied_at(source)
         if tied is None or tied.session != target.session:
             return None
         way = 0.0 if math.isnan(self._target_travelled) else abs(target.travelled - self._target_travelled)
@@ -247,6 +324,12 @@ class Localisation:
                 sigma_m=now.sigma_m,
                 closure=self._closure,
             )
+
+
+def _came(source: Keyframe, target: Keyframe, T: Array, odds: float, closure: LoopClosure | None) -> Came:
+    by_odometry = source.by_odometry and target.by_odometry
+    statement = Statement(Standpoint.of(source), Standpoint.of(target), T, odds, True, by_odometry)
+    return Came(statement, abs(source.turned - target.turned), closure)
 
 
 def ratio(look: Look) -> float:

@@ -14,6 +14,7 @@ from objreg_ros.memory.retrieval import CandidateKeyframe, Index
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar.candidate_search import Budget, Means
+from objreg_ros.registrar.consistency import Standpoint
 from objreg_ros.registrar.localisation.localisation import Localisation
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registration import align
@@ -68,7 +69,10 @@ def places_without_odometry(
 def accepted_poses(
     keyframe: Keyframe, places: Sequence[CandidateKeyframe], means: Means, params: RegistrarParams, budget: Budget
 ) -> Iterator[tuple[Keyframe, Array, float]]:
-    """The keyframes with which it is registered, where the gate accepts that: with ``T_target_source`` and odds."""
+    """The keyframes with which it is registered, where the gate accepts that: with ``T_target_source`` and odds.
+
+    What a person withdrew is none of them.
+    """
     trying = []
     for place in places:
         if budget.over():
@@ -81,5 +85,9 @@ def accepted_poses(
         trying.append((target, means.pool.submit(align, keyframe, target, None, params, means.method, means.gate)))
     for target, asked in trying:
         found = asked.result()
-        if found.accepted and found.candidate is not None:
+        if found.accepted and found.candidate is not None and not _is_vetoed(keyframe, target, found.candidate, means):
             yield target, found.T_target_source, odds_of(found.candidate)
+
+
+def _is_vetoed(keyframe: Keyframe, target: Keyframe, found: Candidate, means: Means) -> bool:
+    return means.vetoes.covers(Standpoint.of(keyframe), Standpoint.of(target), found.T_target_source)

@@ -13,10 +13,12 @@ from objreg_ros.data.localisation import LocalisationState, State
 from objreg_ros.geometry import inverse
 from objreg_ros.memory.known import Last, last_of
 from objreg_ros.memory.sighting import sightings_of
+from objreg_ros.memory.veto import Veto
 from objreg_ros.registrar.localisation.expectation import Look
 from objreg_ros.registrar.localisation.localisation import SHOWN_NS, Localisation
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.relocalisation import Relocalisation
+from objreg_ros.registrar.vetoes import Vetoes
 from objreg_ros.registration.keyframe import Keyframe, KeyObject
 
 EARLIER, NOW = 3, 5
@@ -43,7 +45,7 @@ class Walk:
         self.here.expect(made, known or [])
         return made
 
-    def close(self, source: Keyframe, taken: np.ndarray, odds: float = 200.0) -> None:
+    def close(self, source: Keyframe, taken: np.ndarray, odds: float = 200.0) -> LoopClosure:
         """A closure to the keyframe of the earlier session that is beside where the camera is."""
         T_map_source = taken @ moved(source.travelled)
         target = replace(keyframe(900 + self.step, 0.2 * self.step, (), EARLIER), by_odometry=True)
@@ -60,6 +62,12 @@ class Walk:
         )
         self.here.add_closure(closure, source, target)
         self.relocalisation.add_closure(closure, source, target)
+        return closure
+
+    def veto(self, *closures: LoopClosure) -> None:
+        """A person withdraws these."""
+        self.relocalisation.withdraw(closures)
+        self.here.withdraw(Vetoes(Veto(closure=one) for one in closures))
 
     @property
     def now(self) -> LocalisationState:
@@ -231,3 +239,125 @@ def test_places_that_fit_alike_leave_it_ambiguous_until_a_closure_to_a_map_or_an
     walk.here.set_alike("nothing decides")
     walk.here.expect(replace(keyframe(90, 900.0, (), NOW + 1), by_odometry=True), [])
     assert walk.now.state is not State.AMBIGUOUS
+
+
+def test_after_a_veto_of_all_that_ties_it_it_tracks_with_no_closure_and_no_more_surely_than_before() -> None:
+    walk, untied = Walk(), Walk()
+    closures = [walk.close(walk.go(), np.eye(4)) for _ in range(3)]
+    for _ in range(3):
+        untied.go()
+    assert walk.now.state is State.SURE and walk.now.odds > 10.0 * untied.now.odds
+    walk.veto(*closures)
+    now = walk.now
+    assert now.state is State.TRACKING and now.closure is None and np.isnan(now.probability)
+    assert np.isclose(now.odds, untied.now.odds, rtol=1e-6) and walk.here.sessions() == {NOW}
+
+
+def test_after_a_veto_it_rests_on_what_remains() -> None:
+    walk, without = tied(), tied()
+    false = walk.close(walk.go(), moved(0.05))
+    without.go()
+    for one in (walk, without):
+        one.close(one.go(), np.eye(4))
+    walk.veto(false)
+    found, expected = walk.relocalisation.relocalised, without.relocalisation.relocalised
+    assert found is not None and expected is not None and found.closures == expected.closures
+    assert np.allclose(found.T_map_odom, np.eye(4)) and np.allclose(found.covariance, expected.covariance)
+    assert walk.now.state is State.SURE and np.isclose(walk.now.odds, without.now.odds)
+    assert walk.now.closure is not None and walk.now.sigma_m == without.now.sigma_m
+
+
+def test_after_a_veto_of_those_that_had_it_taken_elsewhere_it_is_where_it_was_tied_before() -> None:
+    walk = tied()
+    false = [walk.close(walk.go(), TAKEN) for _ in range(2)]
+    assert walk.now.state is State.KIDNAPPED
+    walk.veto(*false)
+    now, found = walk.now, walk.relocalisation.relocalised
+    assert now.state is State.SURE and "contradict" in now.reason and walk.here.since_ns == 101 * SECOND
+    assert found is not None and found.closures == 3 and np.allclose(found.T_map_odom, np.eye(4))
+
+
+def test_one_that_is_left_of_two_that_had_it_taken_elsewhere_is_doubt() -> None:
+    walk = tied()
+    first, _ = (walk.close(walk.go(), TAKEN) for _ in range(2))
+    walk.veto(first)
+    now = walk.now
+    assert now.state in (State.SURE, State.UNSURE, State.LOST) and "1 closures contradict" in now.reason
+    walk.close(walk.go(), TAKEN)
+    assert walk.now.state is State.KIDNAPPED and walk.now.reason.startswith("2 closures")
+
+
+def test_a_withdrawn_rival_counts_no_more() -> None:
+    walk = tied()
+    walk.veto(walk.close(walk.go(), TAKEN))
+    assert walk.now.state is State.SURE and "0 closures contradict" in walk.now.reason
+    walk.close(walk.go(), TAKEN)
+    assert walk.now.state is not State.KIDNAPPED and "1 closures contradict" in walk.now.reason
+
+
+def test_without_a_false_tie_those_that_contradicted_it_are_the_tie_and_no_kidnapping() -> None:
+    walk = Walk()
+    false = walk.close(walk.go(), TAKEN, odds=2000.0)
+    assert walk.now.state is State.SURE
+    walk.close(walk.go(), np.eye(4), odds=2000.0)
+    walk.veto(false)
+    walk.close(walk.go(), np.eye(4), odds=2000.0)
+    now, found = walk.now, walk.relocalisation.relocalised
+    assert now.state is State.SURE and "0 closures contradict" in now.reason
+    assert found is not None and found.closures == 2 and np.allclose(found.T_map_odom, np.eye(4))
+
+
+def test_a_kidnapping_that_rests_on_others_stays_after_a_veto() -> None:
+    walk = Walk()
+    false = walk.close(walk.go(), np.eye(4))
+    for _ in range(2):
+        walk.close(walk.go(), np.eye(4))
+    for _ in range(2):
+        walk.close(walk.go(), TAKEN)
+    walk.veto(false)
+    found = walk.relocalisation.relocalised
+    assert walk.now.state is State.KIDNAPPED and walk.here.since_ns == 104 * SECOND
+    assert found is not None and np.allclose(found.T_map_odom, TAKEN)
+
+
+def test_a_veto_of_closures_that_are_none_of_this_camera_changes_nothing() -> None:
+    walk, other = tied(), Walk()
+    walk.go(known(1, 2, 3))
+    before = walk.now
+    other.step = 50
+    walk.veto(other.close(other.go(), np.eye(4)))
+    assert walk.now.odds == before.odds and walk.now.closure is before.closure and walk.now.reason == before.reason
+
+
+def test_a_pose_that_was_found_without_odometry_goes_with_the_veto_of_its_pair() -> None:
+    walk = tied()
+    old = walk.go()
+    for _ in range(11):
+        walk.go()
+    here = walk.go()
+    walk.here.add_rival(here, old, moved(0.0, 0.0, 4.0), 500.0)
+    assert "1 closures contradict" in walk.now.reason
+    closure = LoopClosure(
+        from_ns=old.stamp_ns,
+        to_ns=here.stamp_ns,
+        T_from_to=moved(0.0, 0.0, 4.0),
+        covariance=TIGHT,
+        labels=(),
+        from_session=NOW,
+        to_session=NOW,
+    )
+    walk.veto(closure)
+    assert "0 closures contradict" in walk.now.reason
+
+
+def test_a_closure_that_holds_again_ties_it_again() -> None:
+    walk = Walk()
+    source = walk.go()
+    closure = walk.close(source, np.eye(4), odds=2000.0)
+    target = replace(keyframe(901, 0.2, (), EARLIER), by_odometry=True, travelled=source.travelled)
+    target = replace(target, T_odom_camera=moved(source.travelled + 0.1))
+    walk.veto(closure)
+    assert walk.now.state is State.TRACKING
+    walk.relocalisation.add_closure(closure, source, target)
+    walk.here.admit(closure, source, target)
+    assert walk.now.state is State.SURE and walk.now.closure is closure

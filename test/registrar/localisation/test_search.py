@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from registration.samples import box, candidate, keyframe, moved
 
+from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.retrieval import CandidateKeyframe, Index
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
+from objreg_ros.memory.veto import Veto
 from objreg_ros.registrar.candidate_search import Budget
 from objreg_ros.registrar.localisation.search import (
     TRIES,
@@ -21,6 +23,7 @@ from objreg_ros.registrar.localisation.search import (
     weigh_contrary,
 )
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.vetoes import Vetoes
 from objreg_ros.registration.gate.likelihood import odds_of
 from objreg_ros.registration.gate.verdict import judge
 
@@ -59,3 +62,24 @@ def test_poses_that_the_gate_accepts_without_odometry_are_rivals_and_others_are_
     assert rivals == [(source, target, good.T_target_source, odds_of(good))]
     weigh_contrary(here, source, [(target, good)], judge, 1e9)
     assert len(rivals) == 1
+
+
+def test_a_pose_of_a_pair_that_a_person_withdrew_is_none() -> None:
+    source, target, good = keyframe(2, 20.0, session=1), keyframe(1, 10.0, session=1), candidate(moved(1.0))
+    found = SimpleNamespace(accepted=True, candidate=good, T_target_source=good.T_target_source)
+    pool = SimpleNamespace(submit=lambda *_: SimpleNamespace(result=lambda: found))
+    method = SimpleNamespace(prepare=lambda _: None)
+    store = SimpleNamespace(keyframe=lambda _: target)
+    withdrawn = LoopClosure(
+        from_ns=target.stamp_ns,
+        to_ns=source.stamp_ns,
+        T_from_to=good.T_target_source,
+        covariance=np.eye(6),
+        labels=(),
+        from_session=1,
+        to_session=1,
+    )
+    for vetoes, expected in ((Vetoes(), 1), (Vetoes([Veto(closure=withdrawn)]), 0)):
+        means: Any = SimpleNamespace(store=store, method=method, pool=pool, gate=judge, vetoes=vetoes)
+        poses = list(accepted_poses(source, [CandidateKeyframe(1, 0, 0, 1.0)], means, PARAMS, ENDLESS))
+        assert len(poses) == expected
