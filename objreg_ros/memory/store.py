@@ -14,12 +14,15 @@ from __future__ import annotations
 import math
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from objreg_ros.data.checked import Array
+from objreg_ros.data.closure_id import Identity, identity_of
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.keyframes.recent import RecentKeyframes
 from objreg_ros.memory.claim import Claim, StoreError
@@ -55,7 +58,7 @@ from objreg_ros.memory.transaction import (
     write_keyframe,
     write_veto,
 )
-from objreg_ros.memory.veto import Stand, Veto, veto_from_row
+from objreg_ros.memory.veto import Stand, Veto, closure_numbers, closures_at, veto_from_row
 from objreg_ros.registration.keyframe import Keyframe
 
 LEFT = "; it was left as it is. Use a copy of it or another path"
@@ -138,7 +141,7 @@ class Store:
         numbers = self._numbers("closure")
         with self._reporting("veto a closure"), self._changing() as (transaction, counters):
             for one in vetoes:
-                write_veto(transaction, counters, numbers.get(_key(one.closure)), one)
+                write_veto(transaction, counters, numbers.get(identity_of(one.closure)), one)
 
     def undo_veto(self, vetoes: Sequence[Veto]) -> None:
         """Take vetoes back, all or none: what was a closure of this store is one again. KeyError for one that is none.
@@ -148,18 +151,20 @@ class Store:
         numbers = self._numbers("veto")
         with self._reporting("undo a veto"), self._changing() as (transaction, counters):
             for one in vetoes:
-                take_veto_back(transaction, counters, numbers[_key(one.closure)], one, MOST_CLOSURES)
+                take_veto_back(transaction, counters, numbers[identity_of(one.closure)], one, MOST_CLOSURES)
 
     def vetoes(self) -> list[Veto]:
         """Every closure that is withdrawn, the oldest veto first."""
         with self._reporting("read the vetoes", LEFT):
             return list(map(veto_from_row, self._connection.execute("SELECT * FROM veto ORDER BY id")))
 
-    def _numbers(self, table: str) -> dict[tuple[object, ...], int]:
-        """The numbers of the rows of closures or vetoes, by moments and sessions."""
+    def closure_numbers(self) -> dict[Identity, int]:
+        """The number of every stored closure, for `closures`, by what makes it another; they are not read whole."""
+        return self._numbers("closure")
+
+    def _numbers(self, table: str) -> dict[Identity, int]:
         with self._reporting("read the closures"):
-            read = closure_from_row if table == "closure" else lambda row: veto_from_row(row).closure
-            return {_key(read(row)): row["id"] for row in self._connection.execute(f"SELECT * FROM {table}")}
+            return closure_numbers(self._connection, table)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
         """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""
@@ -184,10 +189,16 @@ class Store:
                     raise ValueError(f"object {row['id']}: expected a stored keyframe, got number {row['keyframe']}")
                 yield sighting_from_row(row, self._heads[row["keyframe"]])
 
-    def closures(self) -> Iterator[LoopClosure]:
-        """Every stored closure, oldest first; its objects have the ids that they had when it was stored."""
+    def closures(self, numbers: Sequence[int] | None = None) -> Iterator[LoopClosure]:
+        """Every stored closure, oldest first, or those of ``numbers``, in their order.
+
+        Their objects have the ids that they had when they were stored.
+        """
         with self._reporting("read the closures"):
-            yield from map(closure_from_row, self._connection.execute("SELECT * FROM closure ORDER BY id"))
+            if numbers is None:
+                yield from map(closure_from_row, self._connection.execute("SELECT * FROM closure ORDER BY id"))
+            else:
+                yield from closures_at(self._connection, numbers)
 
     def keyframe_ids(self) -> list[int]:
         """The ids of the stored keyframes, oldest first."""
@@ -205,10 +216,12 @@ class Store:
     def stand_at(self, session: int | None, stamp_ns: int) -> Stand | None:
         """Where the keyframe of a session at a stamp stood; None where there is none, or it is damaged."""
         number = self.keyframe_at(session, stamp_ns)
-        try:
-            return None if number is None else Stand.of(self.keyframe(number))
-        except StoreError:
-            return None
+        with suppress(StoreError), self._reporting(f"read keyframe {number}"):
+            for row in self._connection.execute("SELECT * FROM keyframe WHERE id = ?", (number,)):
+                require_keyframe(row)
+                T = pose_from_row(row)
+                return Stand(np.eye(4) if T is None else T, row["travelled"])
+        return None
 
     def heads(self) -> Iterator[Mapping[str, Any]]:
         """What is known of each keyframe without reading it, by the names of `HEAD`, the oldest first."""
@@ -384,8 +397,3 @@ class Store:
         except (sqlite3.Error, ValueError, OverflowError, OSError) as error:
             why = " ".join(str(error).split())
             raise StoreError(f"{self.path or 'temporary store'}: cannot {what}: {why}{advice}") from error
-
-
-def _key(closure: LoopClosure) -> tuple[object, ...]:
-    """What makes a closure another: its moments, robots and sessions."""
-    return *closure.moments, *closure.robots, closure.from_session, closure.to_session

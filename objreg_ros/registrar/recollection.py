@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from contextlib import suppress
 
 import numpy as np
 
-from objreg_ros.data.closure_id import closure_id
+from objreg_ros.data.closure_id import closure_id, id_of
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.retrieval import Index
@@ -91,13 +91,11 @@ class Recollection:
 
         ``robot`` is that of closures that name none. StoreError where the store is damaged.
         """
-        among = (veto.closure for veto in self.vetoes) if vetoed else self.store.closures()
-        known = {closure_id(closure, robot): closure for closure in among}
-        lacking = [name for name in ids if name not in known]
-        if not ids or lacking:
-            what = "withdrawn" if vetoed else "stored"
-            raise ValueError(f"ids: expected those of {what} closures, got {', '.join(lacking)[:200] or 'none'}")
-        return [known[name] for name in dict.fromkeys(ids)]
+        if vetoed:
+            withdrawn = {closure_id(veto.closure, robot): veto.closure for veto in self.vetoes}
+            return [withdrawn[name] for name in _known(ids, withdrawn, "withdrawn")]
+        numbers = {id_of(identity, robot): number for identity, number in self.store.closure_numbers().items()}
+        return list(self.store.closures([numbers[name] for name in _known(ids, numbers, "stored")]))
 
     def veto(self, closures: Sequence[LoopClosure]) -> list[Veto]:
         """Withdraw stored closures: they are not found again. StoreError where that cannot be written."""
@@ -178,3 +176,11 @@ class Recollection:
             self.store.remove(spare, forgotten=len(beyond))
             self.index.remove(spare)
             self.landmarks.forget_keyframes(spare)
+
+
+def _known(ids: Sequence[str], known: Container[str], what: str) -> list[str]:
+    """The ids, each once. ValueError for one that is not known."""
+    lacking = [name for name in ids if name not in known]
+    if not ids or lacking:
+        raise ValueError(f"ids: expected those of {what} closures, got {', '.join(lacking)[:200] or 'none'}")
+    return list(dict.fromkeys(ids))

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from objreg_ros.data.checked import Array
+from objreg_ros.data.closure_id import Identity, identity_of
 from objreg_ros.data.closures import LoopClosure, Reason
 from objreg_ros.geometry import inverse
 from objreg_ros.memory.veto import Stand, Veto
@@ -22,16 +23,10 @@ from objreg_ros.registrar.closure import WaitingClosure
 from objreg_ros.registrar.consistency import Standpoint, Statement, agree, path_m
 from objreg_ros.registration.gate.refusal import Refusal
 
-Identity = tuple[object, ...]
 Ends = tuple[int, int]  # the sessions of target and source
 Moment = tuple[int, int]  # session and stamp
 
 VETOED: Refusal = Reason.VETOED, "a person withdrew this constraint, or a neighbouring one whose pose agrees"
-
-
-def identity_of(closure: LoopClosure) -> Identity:
-    """What makes a closure another: moments, robots and sessions."""
-    return *closure.moments, *closure.robots, closure.from_session, closure.to_session
 
 
 class Vetoes:

@@ -13,11 +13,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from objreg_ros.data.closure_id import identity_of
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.veto import Veto
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.vetoes import identity_of
 from objreg_tools.merge.sources import Source, Sources, open_sources
 from objreg_tools.merge.ties import Leg, Tying, legs_of
 from objreg_tools.merge.unfinished import Unfinished

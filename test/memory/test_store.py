@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from registration.samples import box, keyframe, moved
 
+from objreg_ros.data.closure_id import identity_of
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.memory.codec import pack
@@ -722,3 +723,32 @@ def test_closures_that_are_written_together_are_all_there_or_none(tmp_path: Path
     store.add_closures([(closure, {}), (closure, {})])
     assert store.counts()["closures"] == 2 and store.next_closure() == 3
     store.close()
+
+
+def test_where_a_keyframe_stood_is_known_without_its_view(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    store = Store(path)
+    written = replace(keyframe(1, 5.0, session=3), T_odom_camera=moved(2.0), travelled=7.5)
+    store.write_keyframe(written, sightings_of(written))
+    with store._connection as transaction:
+        transaction.execute("UPDATE scene SET checksum = 0")
+    store.close()
+    store = Store(path)
+    stand = store.stand_at(3, written.stamp_ns)
+    assert stand is not None and stand.travelled == 7.5 and np.array_equal(stand.T_session_camera, moved(2.0))
+    assert store.stand_at(2, written.stamp_ns) is None and store.stand_at(None, 5) is None
+    store.close()
+
+
+def test_closures_are_read_by_the_numbers_that_their_names_have() -> None:
+    store = Store()
+    ours = [replace(CLOSURE, to_ns=CLOSURE.to_ns + k) for k in range(3)]
+    for one in ours:
+        store.add_closure(one, {})
+    numbers = store.closure_numbers()
+    assert list(numbers) == [identity_of(one) for one in ours]
+    asked = [numbers[identity_of(ours[2])], numbers[identity_of(ours[0])]]
+    assert [one.to_ns for one in store.closures(asked)] == [ours[2].to_ns, ours[0].to_ns]
+    assert list(store.closures([])) == []
+    with pytest.raises(StoreError, match="expected a closure of the number 99, got none"):
+        list(store.closures([99]))
