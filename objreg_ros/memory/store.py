@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,7 @@ from objreg_ros.memory.transaction import (
     write_keyframe,
     write_veto,
 )
-from objreg_ros.memory.veto import Stand, Veto, closure_numbers, closures_at, veto_from_row
+from objreg_ros.memory.veto import Stand, Veto, closure_numbers, closures_at, numbers_among, veto_from_row
 from objreg_ros.registration.keyframe import Keyframe
 
 LEFT = "; it was left as it is. Use a copy of it or another path"
@@ -138,7 +138,7 @@ class Store:
 
         StoreError where that cannot be written.
         """
-        numbers = self._numbers("closure")
+        numbers = self._numbers("closure", vetoes)
         with self._reporting("veto a closure"), self._changing() as (transaction, counters):
             for one in vetoes:
                 write_veto(transaction, counters, numbers.get(identity_of(one.closure)), one)
@@ -148,7 +148,7 @@ class Store:
 
         StoreError where that cannot be written.
         """
-        numbers = self._numbers("veto")
+        numbers = self._numbers("veto", vetoes)
         with self._reporting("undo a veto"), self._changing() as (transaction, counters):
             for one in vetoes:
                 take_veto_back(transaction, counters, numbers[identity_of(one.closure)], one, MOST_CLOSURES)
@@ -158,13 +158,14 @@ class Store:
         with self._reporting("read the vetoes", LEFT):
             return list(map(veto_from_row, self._connection.execute("SELECT * FROM veto ORDER BY id")))
 
-    def closure_numbers(self) -> dict[Identity, int]:
-        """The number of every stored closure, for `closures`, by what makes it another; they are not read whole."""
-        return self._numbers("closure")
-
-    def _numbers(self, table: str) -> dict[Identity, int]:
+    def closure_numbers(self) -> Generator[tuple[Identity, int], None, None]:
+        """What makes each stored closure another, and its number for `closures`, the newest first; not read whole."""
         with self._reporting("read the closures"):
-            return closure_numbers(self._connection, table)
+            yield from closure_numbers(self._connection, "closure")
+
+    def _numbers(self, table: str, vetoes: Sequence[Veto]) -> dict[Identity, int]:
+        with self._reporting("read the closures"), closing(closure_numbers(self._connection, table)) as numbers:
+            return numbers_among([identity_of(one.closure) for one in vetoes], numbers)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
         """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""

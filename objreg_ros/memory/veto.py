@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ from objreg_ros.memory.codec import closure_from_row, pose_of
 from objreg_ros.registration.keyframe import Keyframe
 
 MOST_VETOES = 10_000  # in a store: a person gives each
-NAMED = ", ".join(f"'$.{name}'" for name in IDENTITY)
+NAMED = ", ".join(f"json_extract(fields, '$.{name}')" for name in IDENTITY)
 DEFAULTS = [next(field.default for field in fields(LoopClosure) if field.name == name) for name in IDENTITY]
 
 
@@ -83,14 +83,25 @@ def veto_from_row(row: Mapping[str, Any]) -> Veto:
         raise ValueError(f"veto {row['id']}: expected a closure and two poses, got others ({error})") from error
 
 
-def closure_numbers(connection: sqlite3.Connection, table: str) -> dict[Identity, int]:
-    """The numbers of all closures, or of all vetoes as ``table`` says, by what makes a closure another.
+def closure_numbers(connection: sqlite3.Connection, table: str) -> Generator[tuple[Identity, int], None, None]:
+    """What makes each closure another, and its number, the newest first; of vetoes where that is the ``table``.
 
     No checksum is asked: who reads a closure whole by its number finds it damaged. sqlite3.Error where one is no JSON.
     """
-    rows = connection.execute(f"SELECT id, json_extract(fields, {NAMED}) FROM {table} ORDER BY id").fetchall()
-    known = json.loads(f"[{','.join(text for _, text in rows)}]")  # all at once: that is faster
-    return {_identity(one): number for one, (number, _) in zip(known, rows, strict=True)}
+    for number, *known in connection.execute(f"SELECT id, {NAMED} FROM {table} ORDER BY id DESC"):
+        yield _identity(known), number
+
+
+def numbers_among(names: Iterable[Identity], numbers: Iterable[tuple[Identity, int]]) -> dict[Identity, int]:
+    """The newest number of each of ``names`` that has one. No more of ``numbers``, the newest first, is read."""
+    lacking, found = set(names), dict[Identity, int]()
+    for name, number in numbers if lacking else ():
+        if name in lacking:
+            lacking.remove(name)
+            found[name] = number
+            if not lacking:
+                break
+    return found
 
 
 def _identity(known: Sequence[Any]) -> Identity:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Container, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import numpy as np
 
@@ -94,8 +94,19 @@ class Recollection:
         if vetoed:
             withdrawn = {closure_id(veto.closure, robot): veto.closure for veto in self.vetoes}
             return [withdrawn[name] for name in _known(ids, withdrawn, "withdrawn")]
-        numbers = {id_of(identity, robot): number for identity, number in self.store.closure_numbers().items()}
+        numbers = self._numbers(frozenset(ids), robot)
         return list(self.store.closures([numbers[name] for name in _known(ids, numbers, "stored")]))
+
+    def _numbers(self, ids: frozenset[str], robot: str) -> dict[str, int]:
+        """The numbers of the stored closures of these ids, of which there may be fewer. Ends with the last of them."""
+        found = dict[str, int]()
+        with closing(self.store.closure_numbers()) as numbers:
+            for identity, number in numbers:
+                if len(found) == len(ids):
+                    break
+                if (name := id_of(identity, robot)) in ids:
+                    found.setdefault(name, number)
+        return found
 
     def veto(self, closures: Sequence[LoopClosure]) -> list[Veto]:
         """Withdraw stored closures: they are not found again. StoreError where that cannot be written."""

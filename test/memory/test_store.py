@@ -745,8 +745,8 @@ def test_closures_are_read_by_the_numbers_that_their_names_have() -> None:
     ours = [replace(CLOSURE, to_ns=CLOSURE.to_ns + k) for k in range(3)]
     for one in ours:
         store.add_closure(one, {})
-    numbers = store.closure_numbers()
-    assert list(numbers) == [identity_of(one) for one in ours]
+    numbers = dict(store.closure_numbers())
+    assert list(numbers) == [identity_of(one) for one in ours[::-1]]
     asked = [numbers[identity_of(ours[2])], numbers[identity_of(ours[0])]]
     assert [one.to_ns for one in store.closures(asked)] == [ours[2].to_ns, ours[0].to_ns]
     assert list(store.closures([])) == []

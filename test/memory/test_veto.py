@@ -20,6 +20,7 @@ from objreg_ros.memory.veto import (
     Veto,
     closure_numbers,
     closures_at,
+    numbers_among,
     numbers_of,
     stand_of,
     veto_from_row,
@@ -58,9 +59,9 @@ def test_rows_of_closures_and_vetoes_are_found_by_what_names_them() -> None:
     for number, one in enumerate((CLOSURE, *others), start=5):
         insert(store, "closure", closure_row(number, one))
     insert(store, "veto", veto_row(9, Veto(closure=others[0])))
-    numbers = closure_numbers(store, "closure")
-    assert numbers == {identity_of(one): number for number, one in enumerate((CLOSURE, *others), start=5)}
-    assert closure_numbers(store, "veto") == {identity_of(others[0]): 9}
+    numbers = list(closure_numbers(store, "closure"))
+    assert numbers == [(identity_of(one), 8 - k) for k, one in enumerate((*others[::-1], CLOSURE))]
+    assert list(closure_numbers(store, "veto")) == [(identity_of(others[0]), 9)]
     assert [one.moments for one in closures_at(store, [8, 5])] == [others[2].moments, CLOSURE.moments]
     with pytest.raises(ValueError, match="expected a closure of the number 4, got none"):
         list(closures_at(store, [4]))
@@ -70,14 +71,22 @@ def test_a_name_that_a_store_of_before_lacks_is_that_of_a_closure_without_it() -
     store, row = temporary(), closure_row(1, CLOSURE)
     fields = {name: value for name, value in json.loads(row["fields"]).items() if not name.endswith(("robot", "id"))}
     insert(store, "closure", row | {"fields": json.dumps(fields)})
-    assert closure_numbers(store, "closure") == {identity_of(CLOSURE): 1}
+    assert list(closure_numbers(store, "closure")) == [(identity_of(CLOSURE), 1)]
 
 
 def test_what_is_not_named_may_be_damaged_and_what_is_named_is_found_damaged() -> None:
     store = temporary()
     insert(store, "closure", closure_row(1, CLOSURE))
     insert(store, "closure", closure_row(2, replace(CLOSURE, to_ns=9)) | {"checksum": 0})
-    assert len(closure_numbers(store, "closure")) == 2
+    assert len(list(closure_numbers(store, "closure"))) == 2
     assert [one.to_ns for one in closures_at(store, [1])] == [2]
     with pytest.raises(ValueError, match="closure 2: expected the checksum"):
         list(closures_at(store, [2]))
+
+
+def test_of_what_is_named_twice_the_newest_is_found_and_no_more_is_read() -> None:
+    one, other, none = (identity_of(replace(CLOSURE, to_ns=k)) for k in (1, 2, 3))
+    numbers = iter([(one, 9), (other, 8), (one, 7), (other, 6)])
+    assert numbers_among([other, one], numbers) == {one: 9, other: 8}
+    assert next(numbers) == (one, 7)
+    assert numbers_among([none], numbers) == numbers_among([], [(one, 9)]) == {}
