@@ -59,6 +59,11 @@ def lack() -> str | None:
         return "expected the tool `ip`, got none; install iproute2"
     if not TUN.exists() and not netem_works():
         return f"expected {TUN} or a kernel with netem, got neither; `modprobe tun` or `modprobe sch_netem`"
+    try:
+        ip("netns", "add", name := f"{PREFIX}-{os.getpid()}-{next(NUMBERS)}")
+        ip("netns", "del", name)
+    except OSError as error:
+        return f"expected network namespaces, got none: {error}; use a container with --privileged"
     return None
 
 

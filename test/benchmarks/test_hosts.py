@@ -43,11 +43,6 @@ def hosts() -> ModuleType:
 def able(hosts: ModuleType) -> ModuleType:
     if (missing := hosts.lack()) is not None:
         pytest.skip(missing)
-    try:
-        hosts.ip("netns", "add", name := f"try-{os.getpid()}")
-        hosts.ip("netns", "del", name)
-    except OSError as error:
-        pytest.skip(f"no network namespace can be made here: {error}")
     return hosts
 
 
@@ -63,6 +58,17 @@ def test_without_root_it_says_so_in_one_line(hosts: ModuleType, monkeypatch: pyt
     result = CliRunner().invoke(hosts.main, ["true"])
     assert result.exit_code == 1 and "expected to run as root" in result.output
     assert result.output.count("\n") <= 1
+
+
+def test_without_namespaces_it_says_so(hosts: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_words: str) -> str:
+        raise OSError("`ip netns add` says: Operation not permitted")
+
+    for name, value in {"os.geteuid": lambda: 0, "shutil.which": str}.items():
+        monkeypatch.setattr(name, value)
+    monkeypatch.setattr(hosts, "netem_works", lambda: True)
+    monkeypatch.setattr(hosts, "ip", refused)
+    assert "expected network namespaces, got none: `ip netns add` says: Operation not permitted" in hosts.lack()
 
 
 def test_the_words_for_netem_say_what_the_conditions_say(hosts: ModuleType) -> None:
