@@ -6,7 +6,7 @@ profile of Fast DDS and each trouble of the link: how many were sent, came, came
 came, and what both ends sent. It needs root; benchmarks/hosts.py has the hosts.
 
     python benchmarks/wireless.py --json OUT
-    python benchmarks/wireless.py --trouble 0.2:30 --profiles config/fastdds_wifi.xml --peers
+    python benchmarks/wireless.py --trouble 0.2:30 --profiles config/fastdds_wifi.xml --peers    without multicast, too
 
 A test sends three messages so, on a machine that does little else:
 
@@ -158,12 +158,17 @@ def row(case: Case, result: Result) -> str:
     return f"| {name} | {link} | {counts} | {ages} | {result.sender_kb_s:.0f} + {result.receiver_kb_s:.0f} |"
 
 
-def cases(rmws: Sequence[str], profiles: Sequence[str], troubles: Sequence[str], **rest: object) -> Iterator[Case]:
+def cases(
+    rmws: Sequence[str], profiles: Sequence[str], troubles: Sequence[str], peers: bool, **rest: object
+) -> Iterator[Case]:
+    """Every profile with every trouble; with ``peers`` the last profile once more, without multicast."""
     for rmw in rmws:
-        for profile in profiles if "fastrtps" in rmw else [OWN]:
+        here = profiles if "fastrtps" in rmw else [OWN]
+        for profile, is_static in [*((profile, False) for profile in here), *([(here[-1], True)] if peers else [])]:
             for trouble in troubles:
                 loss, _, pause_s = trouble.partition(":")
-                yield Case(rmw, profile, float(loss), float(pause_s or 0), **rest)  # type: ignore[arg-type]
+                link = (float(loss), float(pause_s or 0))
+                yield Case(rmw, profile, *link, peers=is_static, **rest)  # type: ignore[arg-type]
 
 
 @click.command(help=__doc__)
@@ -178,19 +183,21 @@ def cases(rmws: Sequence[str], profiles: Sequence[str], troubles: Sequence[str],
 @click.option("--mbit", default=6.0, show_default=True, help="rate of either end's link in Mbit/s")
 @click.option("--messages", default=60, show_default=True, help="sent in a run, one a second")
 @click.option("--size", default=80_000, show_default=True, help="bytes of a message")
-@click.option("--peers", is_flag=True, help="the ends know each other's addresses, and use no multicast")
+@click.option("--peers", is_flag=True, help="the last profile by known addresses without multicast, too")
 @click.option("--linger", "linger_s", default=20.0, show_default=True, help="seconds in which what is late may come")
 @click.option("--seed", default=0, show_default=True, help="of the losses")
 @click.option("--jobs", default=3, show_default=True, help="runs at a time; each has hosts and a link of its own")
 @click.option("--json", "path", type=click.Path(path_type=Path), help="where all figures go")
-def main(rmws: str, profiles: str, troubles: tuple[str, ...], jobs: int, path: Path | None, **rest: object) -> None:
+def main(
+    rmws: str, profiles: str, troubles: tuple[str, ...], jobs: int, peers: bool, path: Path | None, **rest: object
+) -> None:
     if (missing := lack()) is not None:
         raise click.ClickException(missing)
     here = [rmw for rmw in rmws.split(",") if installed(rmw)]
     for rmw in rmws.split(","):
         if rmw not in here:
             click.echo(f"{rmw} is skipped: it is not installed", err=True)
-    todo = list(cases(here, profiles.split(","), troubles, **rest))
+    todo = list(cases(here, profiles.split(","), troubles, peers, **rest))
     click.echo(
         "| middleware, profile | lost | came | twice | age p50 / p95, s | sent, kB/s |\n|---|---|---|---|---|---|"
     )

@@ -32,6 +32,12 @@ def test_each_profile_is_run_with_each_trouble_and_others_than_fast_dds_have_non
     made = list(wireless.cases(rmws, profiles, ("0:0", "0.2:30"), **REST))
     assert [case.profile for case in made] == [profiles[0]] * 2 + [profiles[1]] * 2 + [wireless.OWN] * 2
     assert [(case.loss, case.pause_s) for case in made[:2]] == [(0.0, 0.0), (0.2, 30.0)]
+    assert not any(case.peers for case in made)
+
+
+def test_the_last_profile_is_run_with_static_peers_too(wireless: ModuleType) -> None:
+    made = wireless.cases(["rmw_fastrtps_cpp"], (wireless.OWN, "x.xml"), ("0.2:0",), **{**REST, "peers": True})
+    assert [(case.profile, case.peers) for case in made] == [(wireless.OWN, False), ("x.xml", False), ("x.xml", True)]
 
 
 def test_a_node_has_the_profile_of_its_case_and_none_of_ours(
