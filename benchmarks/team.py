@@ -2,13 +2,14 @@
 """Three robots live: a keyframer for each, one registrar for all, in processes of their own, on one host or on several.
 
     python benchmarks/team.py FOLDER --json team.json
+    python benchmarks/team.py --simulate 1 --frames 60 --json team.json
     python benchmarks/team.py FOLDER --trouble 0:0 --trouble 0.2:0 --trouble 0:30 --json wifi.json    needs root
 
-FOLDER holds a recording for each robot, as `objreg simulate --scenario robots` writes them. What its segmenter makes of
-it is published at ``--rate`` frames a second; the robots start as far apart as they were recorded. All run on this host
-without ``--trouble``. With LOSS:PAUSE each robot is a host of its own (benchmarks/hosts.py), and so is the registrar;
-``config/fastdds_wifi.xml`` carries what passes between them, and the link of the second robot pauses for so many
-seconds.
+FOLDER holds a recording for each robot, as `objreg simulate --scenario robots` writes them; ``--simulate`` makes one
+with this seed. What its segmenter makes of it is published at ``--rate`` frames a second; the robots start as far apart
+as they were recorded. All run on this host without ``--trouble``. With LOSS:PAUSE each robot is a host of its own
+(benchmarks/hosts.py), and so is the registrar; ``config/fastdds_wifi.xml`` carries what passes between them, and the
+link of the second robot pauses for so many seconds.
 
 The store keeps fewer keyframes than were searched for, where others show the same objects from beside (``max_views``).
 A search is cut short while more keyframes of a robot wait than may. ``common`` counts the constraints that the first
@@ -36,7 +37,7 @@ import click
 import wireless
 from hosts import Hosts, conditions_of, lack
 from latency import TICKS
-from robots import Robot, Team, team_of
+from robots import Robot, Team, simulated, team_of
 from sources import SIMULATED
 from team_ends import GO, READY, SAVE, SAVED, SPENT, TOLD
 
@@ -51,6 +52,7 @@ ENDS = str(Path(__file__).with_name("team_ends.py"))
 START_S, SETTLE_S, LAST_S, END_S = 600.0, 120.0, 5.0, 20.0  # a first start compiles kernels
 SAME_NS = 1_000_000_000
 PAUSED = 1  # the robot whose link pauses
+SIMULATED_FRAMES = 500  # of each robot, where nothing else is asked for
 WIFI, LOCAL = "config/fastdds_wifi.xml", "config/fastdds.xml"
 
 
@@ -412,10 +414,20 @@ def trouble_of(text: str, **rest: float) -> Trouble:
         raise click.BadParameter(f"expected LOSS:PAUSE, as 0.2:30, got {text!r}", param_hint="--trouble") from None
 
 
+def recordings(folder: Path | None, seed: int | None, frames: int | None, keep: Path) -> Path:
+    """The folder with a recording for each robot, simulated where a seed is given; UsageError for both or neither."""
+    if folder is not None and seed is None:
+        return folder
+    if folder is None and seed is not None:
+        return simulated(seed, frames or SIMULATED_FRAMES, keep)
+    raise click.UsageError(f"expected FOLDER or --simulate SEED, got {'neither' if folder is None else 'both'}")
+
+
 @click.command(help=__doc__)
-@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("folder", required=False, type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--simulate", "seed", type=int, metavar="SEED", help="Simulate this, in place of FOLDER.")
 @click.option("--rate", default=10.0, show_default=True, help="Frames a second of each robot.")
-@click.option("--frames", type=int, help="So many of each robot, and not all.")
+@click.option("--frames", type=click.IntRange(min=1), help="So many of each robot, and not all; of SEED 500 by itself.")
 @click.option("--trouble", "troubles", multiple=True, metavar="LOSS:PAUSE", help="Of the links of hosts; needs root.")
 @click.option("--delay-ms", default=20.0, show_default=True, help="Of each link.")
 @click.option("--mbit", default=6.0, show_default=True, help="Rate of each host's link in Mbit/s.")
@@ -424,7 +436,8 @@ def trouble_of(text: str, **rest: float) -> Trouble:
 @click.option("--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/robots"), show_default=True)
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 def main(
-    folder: Path,
+    folder: Path | None,
+    seed: int | None,
     rate: float,
     frames: int | None,
     troubles: tuple[str, ...],
@@ -437,7 +450,8 @@ def main(
     if troubles and (missing := lack()) is not None:
         raise click.ClickException(missing)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    made = {name: Robot(robot.frames[:frames], robot.truth) for name, robot in team_of(folder, keep, model).items()}
+    whole = team_of(recordings(folder, seed, frames, keep), keep, model)
+    made = {name: Robot(robot.frames[:frames], robot.truth) for name, robot in whole.items()}
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as laid:
         lay_down(made, rate, Path(laid))

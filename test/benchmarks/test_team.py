@@ -60,6 +60,16 @@ def test_trouble_is_a_loss_and_a_pause(team: ModuleType) -> None:
         team.trouble_of("bad")
 
 
+def test_robots_are_of_a_folder_or_simulated(team: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(team, "simulated", lambda seed, frames, keep: Path(keep, f"{seed}_{frames}"))
+    assert team.recordings(tmp_path, None, 60, Path("kept")) == tmp_path
+    assert team.recordings(None, 1, 60, Path("kept")) == Path("kept/1_60")
+    assert team.recordings(None, 1, None, Path("kept")) == Path("kept/1_500")
+    for folder, seed, got in ((None, None, "neither"), (tmp_path, 1, "both")):
+        with pytest.raises(click.UsageError, match=f"expected FOLDER or --simulate SEED, got {got}"):
+            team.recordings(folder, seed, None, Path("kept"))
+
+
 def test_hosts_without_root_are_refused_in_one_line(
     team: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
