@@ -16,7 +16,7 @@ NOT_MEASURED = "not measured on this version"
 BEGIN, END = "<!-- figures: made by benchmarks/figures.py -->", "<!-- end of figures -->"
 INLINE = re.compile(r"<!-- figure: ([\w.]+) -->.*?<!-- /figure -->", re.DOTALL)
 BUSY = 1.5  # load for each core; one topic beside another is less
-MARKED = ("README.md", "docs/limits.md", "docs/gate.md")
+MARKED = ("README.md", "docs/limits.md", "docs/gate.md", "docs/robots.md")
 
 
 class Line(NamedTuple):

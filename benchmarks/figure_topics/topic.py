@@ -21,6 +21,10 @@ SHARED_PATHS = {
 Values = dict[str, float | str]
 
 
+def nothing() -> None:
+    """What a machine lacks where it lacks nothing."""
+
+
 @dataclass(frozen=True)
 class Row:
     """One claim: its ``values``, taken from the JSON of the command, and the ``text`` that has them in braces.
@@ -48,9 +52,10 @@ class Row:
 class Topic:
     """A benchmark, with the arguments of both sizes, in which a key of `SHARED_PATHS` stands for its path.
 
-    ``KEEP`` stands for a folder in which the command may keep what it has. One that is measured ``alone`` runs beside
-    no other topic, for its times. ``minutes`` are those of the sizes on two cores without other work. A command that
-    ``judges`` ends with status 1 where it found something wrong, which is a figure, too.
+    ``KEEP`` stands for a folder in which the command may keep what it has. ``lack`` says what else this machine lacks.
+    One that is measured ``alone`` runs beside no other topic, for its times. ``minutes`` are those of the sizes on two
+    cores without other work. A command that ``judges`` ends with status 1 where it found something wrong, which is a
+    figure, too.
     """
 
     name: str
@@ -63,6 +68,7 @@ class Topic:
     about: str = ""
     alone: bool = False
     judges: bool = False
+    lack: Callable[[], str | None] = nothing
 
     def command(self, size: str) -> str:
         """The command line of a size as the page has it: without its ``--json`` and what it keeps."""
@@ -79,7 +85,7 @@ class Topic:
         """Why the topic cannot be measured here; empty where it can."""
         needed = [name for name in SHARED_PATHS if name in shlex.split(self.command(size))]
         missing = [name for name in needed if not (shared / SHARED_PATHS[name]).exists()]
-        return f"needs {', '.join(missing)} in $OBJREG_SHARED" if missing else ""
+        return f"needs {', '.join(missing)} in $OBJREG_SHARED" if missing else self.lack() or ""
 
 
 def shared_folder() -> Path:
