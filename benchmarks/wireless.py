@@ -186,7 +186,7 @@ def cases(
 @click.option("--peers", is_flag=True, help="the last profile by known addresses without multicast, too")
 @click.option("--linger", "linger_s", default=20.0, show_default=True, help="seconds in which what is late may come")
 @click.option("--seed", default=0, show_default=True, help="of the losses")
-@click.option("--jobs", default=3, show_default=True, help="runs at a time; each has hosts and a link of its own")
+@click.option("--jobs", default=4, show_default=True, help="runs at a time; each has hosts and a link of its own")
 @click.option("--json", "path", type=click.Path(path_type=Path), help="where all figures go")
 def main(
     rmws: str, profiles: str, troubles: tuple[str, ...], jobs: int, peers: bool, path: Path | None, **rest: object

@@ -49,9 +49,8 @@ def test_a_team_is_summed_over_its_robots(robots: ModuleType) -> None:
         "false": 0,
     }
     assert measured(robots, "team", [run]) == {
-        "searched": "19 of 21",
-        "search": "23.01 s (p95 36.00); 0.30 s (p95 0.61)",
-        "usage": "88 % of a core; 9 to 12 %",
+        "search": "19 of 21; 23.01 s (p95 36.00); 0.30 s (p95 0.61)",
+        "usage": "88 % of a core; 12 %",
         "constraints": "44, 25 between robots, 0 false",
     }
 
@@ -60,8 +59,8 @@ def test_each_profile_has_what_came_and_a_size_without_pauses_says_so(robots: Mo
     raw = [RUN, wifi(twice=1), wifi(peers=True, sender_kb_s=290.2, got=19)]
     assert measured(robots, "wireless", raw) == {
         "lost": "none 0 of 20; fastdds_wifi.xml 20 of 20, 0.99 s (p95 2.43); 1 twice",
-        "pause": "not run in this size",
-        "peers": "98 kB/s; 292 kB/s, 19 of 20, 0.99 s (p95 2.43)",
+        "pause": "not in this size",
+        "peers": "98, 292 kB/s; 19 of 20, 0.99 s (p95 2.43)",
     }
     paused = measured(robots, "wireless", [*raw, {**RUN, "pause_s": 30.0, "met_s": None}])["pause"]
     assert paused == "none never met; 0 twice"

@@ -37,5 +37,7 @@ def walk(folder: Path, room: Path) -> None:
 
     bag.write_bytes(content)
     whole = someone.type(*words)
-    assert "19 of 20 recordings are done already" in whole.text and "recordings: 20, failed: 0, frames: 60" in whole.output
+    assert (
+        "19 of 20 recordings are done already" in whole.text and "recordings: 20, failed: 0, frames: 60" in whole.output
+    )
     assert json.loads(next((folder / "runs").glob(f"{BROKEN}*.json")).read_text())["frames"] == 3
