@@ -69,13 +69,20 @@ def usual_place() -> str:
 
 def line(topic: Topic, row: Row, result: Result | None) -> Line:
     """A row with what was measured, and the command that did it or would."""
-    known = result.figures.get(row.key) if result else None
-    text = row.measured(known) if known else NOT_MEASURED
-    if known and result and row.timed and result.load > BUSY * result.cores:
-        text += " (busy machine)"
-    return Line(
-        row.claim, text, result.command if result else topic.command(QUICK), result.size if known and result else ""
-    )
+    text = _measured(row, result)
+    command = result.command if result else topic.command(QUICK)
+    if text is None or result is None:
+        return Line(row.claim, NOT_MEASURED, command, "")
+    is_busy = row.timed and result.load > BUSY * result.cores
+    return Line(row.claim, f"{text} (busy machine)" if is_busy else text, command, result.size)
+
+
+def _measured(row: Row, result: Result | None) -> str | None:
+    """The text of a row; None where it was not measured, or had other values then."""
+    try:
+        return row.measured(result.figures[row.key]) if result else None
+    except KeyError:
+        return None
 
 
 def marked(name: str, text: str) -> str:
@@ -122,13 +129,8 @@ def history() -> dict[str, Any]:
 
 def _kept(topic: Topic, row: Row, folder: Path) -> str:
     result = read_result(topic.name, folder)
-    if result is None or row.key not in result.figures:
-        return "–"
-    try:
-        text = row.measured(result.figures[row.key])
-    except KeyError:  # the row had other values then
-        return "–"
-    return f"{text} ({result.size})"
+    text = _measured(row, result)
+    return "–" if text is None or result is None else f"{text} ({result.size})"
 
 
 def _template(name: str) -> jinja2.Template:

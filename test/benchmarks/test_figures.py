@@ -192,7 +192,7 @@ def test_what_was_not_run_says_so(scripts: dict[str, ModuleType], kept: Path) ->
 def test_what_is_kept_is_drawn(scripts: dict[str, ModuleType], kept: Path, result: Any) -> None:
     result.write(kept)
     pages = scripts["figure_draw"].pages()
-    assert "| 0.8 s, 188 MB | `benchmarks/start.py --rounds 1` |" in pages["docs/figures.md"]
+    assert "|0.8 s, 188 MB|`benchmarks/start.py --rounds 1`|" in pages["docs/figures.md"]
     assert "| 0.8 s, 188 MB | quick |" in pages["README.md"]
     assert "| 0.8 s, 188 MB (quick) |" in pages["docs/figures-history.md"]
 
@@ -200,6 +200,13 @@ def test_what_is_kept_is_drawn(scripts: dict[str, ModuleType], kept: Path, resul
 def test_times_of_a_busy_machine_say_so(scripts: dict[str, ModuleType], kept: Path, result: Any) -> None:
     replace(result, load=14.0).write(kept)
     assert "| 0.8 s, 188 MB (busy machine) | quick |" in scripts["figure_draw"].pages()["README.md"]
+
+
+def test_a_row_that_has_other_values_now_is_not_measured(
+    scripts: dict[str, ModuleType], kept: Path, result: Any
+) -> None:
+    replace(result, figures={"one": {"minutes": 1}}).write(kept)
+    assert "| not measured on this version |  |" in scripts["figure_draw"].pages()["README.md"]
 
 
 def test_figures_of_another_version_are_history_alone(scripts: dict[str, ModuleType], kept: Path, result: Any) -> None:
