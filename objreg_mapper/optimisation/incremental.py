@@ -210,6 +210,7 @@ class IncrementalGraph:
         isam = self._tree.isam
         if len(nodes) <= PAIR or self._is_careful:
             joint = isam.jointMarginalCovariance(nodes)
+            isam.deleteCachedShortcuts()  # what it keeps for the next, on all cliques up to the root
             return np.block([[joint.at(a, b) for b in nodes] for a in nodes])
         linear = isam.getFactorsUnsafe().linearize(isam.getLinearizationPoint())
         net = linear.marginalMultifrontalBayesNet(self._gtsam.Ordering(nodes))

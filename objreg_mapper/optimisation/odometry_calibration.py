@@ -71,12 +71,14 @@ class OdometryCalibration:
     def _corrected(self, routes: Routes, belief: Belief) -> Fit:
         """In turn what the map says is steadily wrong with odometry, and the map, until the first changes little."""
         found = self._steady(routes, belief.poses)
-        for _ in range(ROUNDS):
-            fit = self._fit(routes, found, belief)
+        fit = self._fit(routes, found, belief)
+        for _ in range(ROUNDS - 1):
             routes, belief = fit.routes, fit.graph.belief()
             known, found = found, self._steady(routes, belief.poses)
             if np.allclose([*found.values()], [*known.values()], atol=SETTLED):
                 break
+            del fit  # it takes no memory while the next is made
+            fit = self._fit(routes, found, belief)
         return fit
 
     def _steady(self, routes: Routes, poses: Array) -> dict[int, Steady]:

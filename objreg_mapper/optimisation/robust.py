@@ -149,18 +149,7 @@ class RobustGraph:
 
         ``apart`` is what it says to a graph that it is not in: with the freedom that nodes have which it alone holds.
         """
-        before, apart = self._state, apart or closure
-        self.closures, self._apart = self.closures.joined(closure), self._apart.joined(apart)
-        newest = len(self.closures) - 1
-        expected = self._expected_cost(before, newest)
-        self._expected = np.append(self._expected, expected)
-        residual = squared_residuals(before.poses, apart)
-        self._state = replace(
-            before,
-            factors=np.append(before.factors, -1),
-            residuals=np.append(before.residuals, residual),
-            cost=before.cost + self.limit,
-        )
+        expected, newest = self._left_out(closure, apart or closure), len(self.closures) - 1
         if expected <= self.limit:
             self._welcome(closure)
         elif expected < LINEAR * self.limit or self._is_agreed(newest):
@@ -168,6 +157,19 @@ class RobustGraph:
         self._take(self._sorted_out(self._state))
         if not self.kept[newest]:
             self._doubt(newest)
+
+    def _left_out(self, closure: Edges, apart: Edges) -> float:
+        """Note a closure as one that is left out. Returns what it is expected to cost to believe it."""
+        self.closures, self._apart = self.closures.joined(closure), self._apart.joined(apart)
+        expected = self._expected_cost(self._state, len(self.closures) - 1)
+        self._expected = np.append(self._expected, expected)
+        self._state = replace(
+            self._state,
+            factors=np.append(self._state.factors, -1),
+            residuals=np.append(self._state.residuals, squared_residuals(self._state.poses, apart)),
+            cost=self._state.cost + self.limit,
+        )
+        return expected
 
     def _welcome(self, closure: Edges) -> None:
         """Believe the newest closure, which is expected to fit: nothing is tried on a copy, as for those in doubt."""
@@ -190,7 +192,7 @@ class RobustGraph:
             if not np.isfinite(without.cost):
                 raise RuntimeError(f"expected a solution without closure {number}, got none")
             self._state = self._sorted_out(without)
-            self._take(self._tried_again(self._state, ()))
+            self._try_again(self._state, ())
 
     def admit(self, number: int) -> None:
         """A closure that was withdrawn may be believed again."""
@@ -268,22 +270,22 @@ class RobustGraph:
 
     def _leave_out(self, numbers: list[int], known: _Known) -> None:
         """Where all else is better then."""
-        without = self._sorted_out(self._changed(self._state, [], numbers), stays_out=numbers)
-        self._take(without)
-        self._take(self._tried_again(without, numbers, known))
+        self._try_again(self._sorted_out(self._changed(self._state, [], numbers), stays_out=numbers), numbers, known)
 
-    def _tried_again(self, state: _State, stays_out: Sequence[int], known: _Known | None = None) -> _State:
-        """With a closure back in that fits a map which some less hold; others follow it by themselves."""
+    def _try_again(self, state: _State, stays_out: Sequence[int], known: _Known | None = None) -> None:
+        """Take a state, or it with a closure back in that fits a map which some less hold; others follow it."""
+        self._take(state)
         left_out = np.setdiff1d(np.flatnonzero(~state.kept), [*stays_out, *self._withdrawn])
         again = left_out[np.argsort(state.residuals[left_out])][:MOST_RETRIED].tolist()
         if not again:
-            return state
+            return
         influence = self._influence_in(state, again, known)
         for k in again:
             if not state.kept[k] and influence.expected_cost(k) <= self.limit:
-                state = self._sorted_out(self._changed(state, [k], []), stays_out=stays_out)
+                state = self._changed(state, [k], [])  # the one before takes no memory meanwhile
+                state = self._sorted_out(state, stays_out=stays_out)
                 influence = self._influence_in(state, again, known)
-        return state
+        self._take(state)
 
     def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: Sequence[int] = ()) -> _State:
         """Closures go in and out until none wants to. The best state of all rounds."""
@@ -295,16 +297,24 @@ class RobustGraph:
                 out[stays_in] = False
             if not out.any() and not into.any():
                 break
-            state = self._changed(state, np.flatnonzero(into).tolist(), np.flatnonzero(out).tolist())
+            is_spare = state.graph is not best.graph  # it was made here, and is not the best
+            tried = self._tried(state, np.flatnonzero(into).tolist(), np.flatnonzero(out).tolist(), is_spare)
+            if tried is None:
+                break
+            state = tried
             if state.cost < best.cost:
                 best = state
         return best
 
     def _changed(self, state: _State, into: list[int], out: list[int]) -> _State:
         """With other closures in it; one that costs infinitely where that has no solution."""
+        return self._tried(state, into, out) or replace(state, cost=np.inf)
+
+    def _tried(self, state: _State, into: list[int], out: list[int], is_spare: bool = False) -> _State | None:
+        """With other closures in it; None where that has no solution. A spare state is of no use any more."""
         factors = state.factors.copy()
         try:
-            graph = state.graph.copied()
+            graph = state.graph if is_spare else state.graph.copied()
             if out:
                 graph.remove(factors[out].tolist())
                 factors[out] = -1
@@ -312,7 +322,7 @@ class RobustGraph:
                 factors[into] = graph.add_edges(self.closures.taken(np.array(into)))
             return self._weighed(graph, factors)
         except (RuntimeError, ValueError):
-            return replace(state, cost=np.inf)
+            return None
 
     def _weighed(self, graph: IncrementalGraph, factors: Array) -> _State:
         poses = graph.solve_poses()
