@@ -19,6 +19,7 @@ from objreg_mapper.session import Session, stacked
 from objreg_ros.data.checked import Array
 from objreg_ros.geometry import inverses, rotation_from_vector, skew
 
+AT_ONCE = 4000  # keyframes that are spread together: each takes some 2 kB meanwhile
 STRAIGHT_RAD = 0.06  # one sigma: what an error that is shared by first order may turn by
 
 
@@ -93,14 +94,21 @@ class Chain:
 
         The conditional mean of each, given the next node; what is before the first and after the last is carried along.
         """
-        wanted = np.arange(len(self)) if keyframes is None else keyframes
+        wanted, known = np.arange(len(self)) if keyframes is None else keyframes, np.asarray(nodes)
+        T = np.empty((len(wanted), 4, 4))
+        for begin in range(0, len(wanted), AT_ONCE):
+            part = slice(begin, begin + AT_ONCE)
+            T[part] = self._spread(known, T_map_body, wanted[part])
+        return T
+
+    def _spread(self, nodes: Array, T_map_body: Array, wanted: Array) -> Array:
         at = np.clip(np.searchsorted(nodes, wanted, side="right") - 1, 0, len(nodes) - 1)
-        k1 = np.asarray(nodes)[at]
+        k1 = nodes[at]
         T_map_chain = T_map_body[at] @ inverses(self.T_chain_body[k1])
         local = self.T_chain_body[wanted].copy()
         inside = np.flatnonzero((wanted > k1) & (at < len(nodes) - 1))
         if len(inside):
-            at, k2 = at[inside], np.asarray(nodes)[at[inside] + 1]
+            at, k2 = at[inside], nodes[at[inside] + 1]
             target = inverses(T_map_chain[inside]) @ T_map_body[at + 1]
             local[inside] = self._shared(k1[inside], wanted[inside], k2, target)
         return T_map_chain @ local

@@ -153,8 +153,8 @@ class RobustGraph:
         if expected <= self.limit:
             self._welcome(closure)
         elif expected < LINEAR * self.limit or self._is_agreed(newest):
-            self._take(self._sorted_out(self._changed(self._state, [newest], []), stays_in=newest))
-        self._take(self._sorted_out(self._state))
+            self._improve(self._changed(self._state, [newest], []), stays_in=newest)
+        self._improve(self._state)
         if not self.kept[newest]:
             self._doubt(newest)
 
@@ -197,7 +197,7 @@ class RobustGraph:
     def admit(self, number: int) -> None:
         """A closure that was withdrawn may be believed again."""
         self._withdrawn = tuple(gone for gone in self._withdrawn if gone != number)
-        self._take(self._sorted_out(self._changed(self._state, [number], [])))
+        self._improve(self._changed(self._state, [number], []))
 
     def _take(self, state: _State) -> None:
         """The better one of two."""
@@ -287,24 +287,40 @@ class RobustGraph:
                 influence = self._influence_in(state, again, known)
         self._take(state)
 
-    def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: Sequence[int] = ()) -> _State:
-        """Closures go in and out until none wants to. The best state of all rounds."""
+    def _improve(self, state: _State, stays_in: int = -1) -> None:
+        """Closures go in and out of a state until none wants to. Take the best of all rounds, if it is better."""
+        for _ in range(ROUNDS):
+            self._take(state)
+            into, out = self._wanting(state, stays_in)
+            is_spare = state.graph is not self._state.graph
+            tried = self._tried(state, into, out, is_spare) if into or out else None
+            if tried is None:
+                return
+            state = tried
+        self._take(state)
+
+    def _sorted_out(self, state: _State, stays_out: Sequence[int] = ()) -> _State:
+        """Closures go in and out until none wants to. The best state of all rounds, which is taken if it is better."""
         best = state
         for _ in range(ROUNDS):
-            out, into = state.kept & (state.residuals > self.limit), ~state.kept & (state.residuals <= self.limit)
-            into[[*self._withdrawn, *stays_out]] = False
-            if stays_in >= 0:
-                out[stays_in] = False
-            if not out.any() and not into.any():
-                break
-            is_spare = state.graph is not best.graph  # it was made here, and is not the best
-            tried = self._tried(state, np.flatnonzero(into).tolist(), np.flatnonzero(out).tolist(), is_spare)
+            into, out = self._wanting(state, stays_out=stays_out)
+            is_spare = state.graph is not best.graph
+            tried = self._tried(state, into, out, is_spare) if into or out else None
             if tried is None:
                 break
             state = tried
             if state.cost < best.cost:
                 best = state
+                self._take(best)  # the one before takes no memory any more
         return best
+
+    def _wanting(self, state: _State, stays_in: int = -1, stays_out: Sequence[int] = ()) -> tuple[list[int], list[int]]:
+        """The closures that want into a state, and those that want out."""
+        out, into = state.kept & (state.residuals > self.limit), ~state.kept & (state.residuals <= self.limit)
+        into[[*self._withdrawn, *stays_out]] = False
+        if stays_in >= 0:
+            out[stays_in] = False
+        return np.flatnonzero(into).tolist(), np.flatnonzero(out).tolist()
 
     def _changed(self, state: _State, into: list[int], out: list[int]) -> _State:
         """With other closures in it; one that costs infinitely where that has no solution."""

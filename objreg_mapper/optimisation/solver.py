@@ -11,6 +11,7 @@ from objreg_mapper.optimisation.chain import Chain
 from objreg_mapper.optimisation.joining import place_of, votes_on
 from objreg_mapper.optimisation.keyframe_graph import KeyframeGraph
 from objreg_mapper.optimisation.problem import Problem, Solution
+from objreg_mapper.optimisation.spare_memory import give_back
 from objreg_mapper.optimisation.steady import Steady
 from objreg_ros.data.checked import Array
 
@@ -91,6 +92,7 @@ class GrowingMap:
         if len(self._numbers) >= self._due:
             self._due = max(len(self._numbers) + 1, int(GROWTH * len(self._numbers)))
             self.graph.calibrate(problem)
+        give_back()
         return self._solution(problem)
 
     def _withdraw(self, problem: Problem) -> None:

@@ -130,6 +130,13 @@ def test_some_keyframes_are_where_all_of_them_are() -> None:
     np.testing.assert_allclose(chain().spread((0, COUNT - 1), T_map_body, wanted), whole[wanted], atol=1e-12)
 
 
+def test_few_keyframes_at_once_are_where_all_of_them_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    nodes, T_map_body = (0, 6, COUNT - 1), np.array([ODOM[0], ODOM[6], bent_end()])
+    whole = chain().spread(nodes, T_map_body)
+    monkeypatch.setattr("objreg_mapper.optimisation.chain.AT_ONCE", 4)
+    np.testing.assert_array_equal(chain().spread(nodes, T_map_body), whole)
+
+
 def test_a_map_that_agrees_with_odometry_is_odometry() -> None:
     np.testing.assert_allclose(chain().spread((0, 7, 14), ODOM[[0, 7, 14]]), ODOM, atol=1e-12)
 
