@@ -4,7 +4,7 @@
     python -m training.likelihood gather --first-seed 8100 --out EVIDENCE     # 36 recordings, an hour on two cores
     python -m training.likelihood fit EVIDENCE --write
     python -m training.likelihood check OTHERS                 # recordings that were not fitted to
-    python -m training.likelihood fresh --first-seed 12100     # gather such ones and check them
+    python -m training.likelihood fresh --first-seed 20100     # gather such ones and check them
 
 An additive logistic model: the logarithm of the odds is the sum of one function for each kind of evidence, piecewise
 linear, and monotone by bounds on its slopes. Right and false poses weigh the same in sum. `fit` leaves out one sensor

@@ -167,7 +167,7 @@ TOPICS = (
     Topic(
         name="odds",
         title="The odds of the gate",
-        script="training/likelihood.py fresh --first-seed 12100 --keep KEEP",
+        script="training/likelihood.py fresh --first-seed 20100 --keep KEEP",
         quick="--every 36",
         whole="",
         minutes=(1, 60),
