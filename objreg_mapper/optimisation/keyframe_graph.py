@@ -94,8 +94,11 @@ class KeyframeGraph:
 
     def calibrate(self, problem: Problem) -> None:
         """Take what is steadily wrong out of odometry, or leave it in, whichever explains more."""
-        fit = OdometryCalibration(problem, self._tethers).best(Fit(self._routes, self.robust))
-        self._routes, self.robust = dict(fit.routes), fit.graph
+        calibration = OdometryCalibration(problem, self._tethers)
+        for step in (calibration.plain, calibration.best):  # after the first, the graph of before takes no memory
+            fit = step(Fit(self._routes, self.robust))
+            self._routes, self.robust = dict(fit.routes), fit.graph
+            del fit
 
     def place_of(self, problem: Problem, end: End) -> Array | None:
         """``T_map_body`` of a keyframe; None of one whose session is not in it."""

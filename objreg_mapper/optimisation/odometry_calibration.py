@@ -54,18 +54,21 @@ class OdometryCalibration:
     problem: Problem
     tethers: Sequence[Row]
 
-    def best(self, now: Fit) -> Fit:
-        """The fit that explains most, with odometry as it is if none explains more."""
-        expected, count = self.problem.params.steady, len(now.graph.closures)
-        if not any(expected):
+    def plain(self, now: Fit) -> Fit:
+        """The fit with odometry as it is; that which is given where nothing was taken out, or nothing can be."""
+        if not (now.is_corrected and any(self.problem.params.steady)):
             return now
-        plain = now
-        if now.is_corrected:
-            plain = self._fit(now.routes, dict.fromkeys(now.routes, Steady()), now.graph.belief())
+        return self._fit(now.routes, dict.fromkeys(now.routes, Steady()), now.graph.belief())
+
+    def best(self, plain: Fit) -> Fit:
+        """The fit that explains most, the `plain` one if none explains more."""
+        expected, count = self.problem.params.steady, len(plain.graph.closures)
+        if not any(expected):
+            return plain
         suspects = plain.graph.left_out[-MOST_TRIED:] if count <= FEW else []
         starts = [plain.graph.belief(), *map(plain.graph.belief_with, suspects)]  # it may be right if odometry is not
         best = min((self._corrected(plain.routes, start) for start in starts), key=lambda fit: fit.cost(expected))
-        needed = FREEDOMS_OF_STEADY * len(now.routes) * np.log(FREEDOMS * count)
+        needed = FREEDOMS_OF_STEADY * len(plain.routes) * np.log(FREEDOMS * count)
         return best if best.cost(expected) + needed < plain.cost(expected) else plain
 
     def _corrected(self, routes: Routes, belief: Belief) -> Fit:

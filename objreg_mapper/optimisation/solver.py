@@ -92,7 +92,7 @@ class GrowingMap:
         if len(self._numbers) >= self._due:
             self._due = max(len(self._numbers) + 1, int(GROWTH * len(self._numbers)))
             self.graph.calibrate(problem)
-        give_back()
+            give_back()  # what the graphs took that were compared
         return self._solution(problem)
 
     def _withdraw(self, problem: Problem) -> None:

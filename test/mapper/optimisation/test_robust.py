@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Any
+from weakref import ReferenceType, ref
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from objreg_ros.geometry import pose, rotation_from_vector
 COUNT = 12
 LIMIT = 4.0**2
 STEP = 0.02  # m and rad, one sigma
+SIDEWAYS = [0.0, 0.0, 0.0, 0.5, 0.45, -0.6]  # m: how false random closures are
 RIGHT = [(0, 9), (1, 10), (0, 11), (2, 8), (3, 11)]
 
 
@@ -133,6 +135,27 @@ def test_what_was_left_out_in_vain_is_left_out_again_only_if_more_is_expected(mo
     graph.close(lie(0, 10, 100.0))
     assert len(set(tried)) < len(tried)
     assert graph.kept.tolist() == [True] * 5 + [False] * 4
+
+
+def test_two_graphs_take_memory_at_once_however_many_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, alive = list[ReferenceType[IncrementalGraph]](), list[int]()
+    begin, solve = IncrementalGraph.__init__, IncrementalGraph.solve_poses
+
+    def counted(graph: IncrementalGraph, *given: Any, **named: Any) -> None:
+        made.append(ref(graph))
+        begin(graph, *given, **named)
+
+    def looked_at(graph: IncrementalGraph) -> Array:
+        alive.append(sum(one() is not None for one in made))
+        return solve(graph)
+
+    monkeypatch.setattr(IncrementalGraph, "__init__", counted)
+    monkeypatch.setattr(IncrementalGraph, "solve_poses", looked_at)
+    rng = np.random.default_rng(9)
+    said = [(a := int(rng.integers(0, 6)), int(rng.integers(a + 3, COUNT)), rng.choice(SIDEWAYS)) for _ in range(10)]
+    graph = closed(lie(*one) for one in said)
+    assert 0 < np.count_nonzero(graph.kept) < len(said)
+    assert len(made) > 5 and max(alive) == 2
 
 
 def test_the_expected_cost_is_the_rise_of_the_cost() -> None:
