@@ -20,7 +20,7 @@ from typing import Any
 import attacked_messages as good
 from attacked_commands import contents
 from attacked_nodes import PACE_S, SHARES, SIEGES, Siege
-from mutation import FLOATS, INTS, WORDS
+from mutation import FLOATS, INTS, STRINGS
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters, SetParametersAtomically
@@ -49,9 +49,9 @@ class Called(Siege):
 
     DOMAIN = 60
 
-    def __init__(self, room: str, folder: Path) -> None:
+    def __init__(self, stage: str, folder: Path) -> None:
         self._home, self._clients = _home(folder), dict[str, Any]()
-        super().__init__(room, folder)
+        super().__init__(stage, folder)
 
     def options(self) -> Sequence[str]:
         """Where it may write."""
@@ -95,7 +95,7 @@ class Called(Siege):
         answer, began = self.client(kind, name).call_async(kind.Request(**fields)), time.monotonic()
         self.settle_all([answer])
         if not answer.done() and self._alive():
-            self.tally.find(seed, "hang", f"no answer of ~/{name} within {ANSWER_S:.0f} s", self._last_words())
+            self.tally.find(seed, "hang", f"no answer of ~/{name} within {ANSWER_S:.0f} s", self._last_line())
             return None
         if (spent := time.monotonic() - began) > PATIENCE_S and seed >= 0:
             self.tally.find(seed, "hang", f"an answer of ~/{name}: after {spent:.0f} s", "")
@@ -110,7 +110,7 @@ class Called(Siege):
     def show_good(self) -> None:
         """Publish a good frame, whatever becomes of it."""
         self._now_ns += good.SECOND // 10
-        for topic, message in self.room.frame(self._now_ns).items():
+        for topic, message in self.inputs.frame(self._now_ns).items():
             self._publish(topic, message)
 
     def require_kept(self, seed: int) -> None:
@@ -196,7 +196,7 @@ class Parameters(Called):
         baits = [str(path) for path in self._before] + [
             str(self._home / name) for name in ("new.g2o", "no/new", "pipe")
         ]
-        return draw.choice((*(word for word in WORDS if "\0" not in word), *baits))
+        return draw.choice((*(text for text in STRINGS if "\0" not in text), *baits))
 
 
 def fault_of(wanted: ParameterValue, result: Any, old: ParameterValue, new: ParameterValue) -> str:
@@ -275,4 +275,4 @@ def _home(folder: Path) -> Path:
 
 
 SIEGES |= {"parameters": Parameters, "services": Services}
-TARGETS = {f"{kind} {room}": 0.5 * share for kind in ("parameters", "services") for room, share in SHARES.items()}
+TARGETS = {f"{kind} {stage}": 0.5 * share for kind in ("parameters", "services") for stage, share in SHARES.items()}

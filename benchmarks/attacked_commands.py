@@ -162,8 +162,8 @@ def _lead(draw: random.Random, connection: socket.socket, own: str) -> None:
         f"https://127.0.0.1:{port}/x.onnx", "//", "http://[", "javascript:1", "http://127.0.0.1:99999/x", "\x00",
     ))  # fmt: skip
     code = draw.choice((301, 302, 303, 307, 308, 300, 304))
-    words = f"HTTP/1.1 {code} Found\r\nLocation: {target}\r\nContent-Length: {draw.choice((0, 10**12))}\r\n\r\n"
-    connection.sendall(words.encode())
+    response = f"HTTP/1.1 {code} Found\r\nLocation: {target}\r\nContent-Length: {draw.choice((0, 10**12))}\r\n\r\n"
+    connection.sendall(response.encode())
 
 
 def _drip(draw: random.Random, connection: socket.socket, _: str) -> None:
@@ -188,7 +188,7 @@ def _pour(draw: random.Random, connection: socket.socket, _: str) -> None:
 
 def _babble(draw: random.Random, connection: socket.socket, _: str) -> None:
     """What is no answer, or one to another question."""
-    words = draw.choice((
+    response = draw.choice((
         b"", b"\0" * 100, b"HTTP/9.9 999 ?\r\n\r\n", b"HTTP/1.1 200\r\n\r\nx", draw.randbytes(500),
         b"HTTP/1.1 416 No\r\nContent-Length: 0\r\n\r\n", b"HTTP/1.1 401 No\r\nWWW-Authenticate: Basic\r\n\r\n",
         b"HTTP/1.1 206 Partial\r\nContent-Range: bytes 7-9/10\r\nContent-Length: 3\r\n\r\nabc",
@@ -196,7 +196,7 @@ def _babble(draw: random.Random, connection: socket.socket, _: str) -> None:
         OK + b"Content-Disposition: attachment; filename=/tmp/x.onnx\r\nContent-Length: 3\r\n\r\nabc",
         OK + b"Transfer-Encoding: chunked\r\n\r\nFFFFFFFFFFFFFFFFF\r\n",
     ))  # fmt: skip
-    connection.sendall(words)
+    connection.sendall(response)
 
 
 ANSWERS: tuple[Answer, ...] = (_send, _lead, _lead, _drip, _pour, _babble, _babble)

@@ -108,12 +108,12 @@ def _said(path: Path, read_only: bool) -> dict[str, Any]:
         counts, last = store.counts(), store.sessions_beyond("", 10, 0)
         nexts = store.next_keyframe(), store.next_landmark(), store.next_session()
         rest = {"ids": ids, "counts": counts, "next": nexts, "beyond": store.beyond(1), "last": last}
-        told = {"sightings": list(store.sightings()), "closures": list(store.closures())}
-        return {name: plain(value) for name, value in {**answers, **rest, **told}.items()}
+        listed = {"sightings": list(store.sightings()), "closures": list(store.closures())}
+        return {name: plain(value) for name, value in {**answers, **rest, **listed}.items()}
 
 
 def plain(value: Any) -> Any:
-    """A word as things that can be compared."""
+    """A value as things that can be compared."""
     if isinstance(value, np.ndarray):
         return value.dtype.str, value.shape, value.tobytes()
     if is_dataclass(value):
@@ -214,7 +214,7 @@ def _write_models(tiny: ModuleType, folder: Path) -> list[Path]:
 def _lie(draw: random.Random, onnx: Any, path: Path, place: Path) -> str:
     """Change the metadata or the size of the input. What must not pass, if it is known not to."""
     model = onnx.load(path)
-    told = {pair.key: pair.value for pair in model.metadata_props}
+    metadata = {pair.key: pair.value for pair in model.metadata_props}
     what = draw.choice(("priors", "variances", "labels", "contract", "mean", "input"))
     lie = ""
     if what == "input":
@@ -224,11 +224,11 @@ def _lie(draw: random.Random, onnx: Any, path: Path, place: Path) -> str:
     elif what == "priors":
         priors = np.array([[0.5, 0.5, 0.4, 0.4], [0.2, 0.2, 0.1, 0.1]], "<f4")
         value = priors[draw.randrange(2), draw.randrange(4)] = draw.choice(FLOATS)
-        told["objreg.priors"] = base64.b64encode(priors.tobytes()[: draw.choice((32, 32, 32, 31, 0))]).decode()
+        metadata["objreg.priors"] = base64.b64encode(priors.tobytes()[: draw.choice((32, 32, 32, 31, 0))]).decode()
         lie = "" if np.isfinite(value) or "tf" in path.name else f"a prior of {value}"
     else:
-        told[f"objreg.{what}"] = _text(draw, what)
-    onnx.helper.set_model_props(model, told)
+        metadata[f"objreg.{what}"] = _text(draw, what)
+    onnx.helper.set_model_props(model, metadata)
     onnx.save(model, place)
     return lie
 

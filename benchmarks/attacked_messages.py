@@ -26,7 +26,7 @@ from trials import Attempt, Target, WrongAnswerError
 from objreg_ros.bridge.messages import camera_from_msg, from_msg, headers, motion_from_msg, to_msg
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import Frame, ObjectCloud, View
-from objreg_ros.data.frames import Odometry as OdometryWord
+from objreg_ros.data.frames import Odometry as OdometryData
 from objreg_ros.data.images import ColourImage, DepthImage, Detections, Intrinsics, PointCloud
 from objreg_ros.geometry import back_project
 from objreg_ros.segmenter.sensor.organise import organise
@@ -44,22 +44,22 @@ Use = Callable[..., None]
 # -------------------------------------------------------------------------------------------------------- good messages
 
 
-def depth_word(stamp_ns: int = SECOND, camera: Intrinsics = SMALL) -> DepthImage:
+def depth_image(stamp_ns: int = SECOND, camera: Intrinsics = SMALL) -> DepthImage:
     """A block before a slanting wall."""
     v = np.mgrid[: camera.height, : camera.width][0]
     depth = (1.4 - 0.3 * v / camera.height).astype(np.float32)
     depth[camera.height // 3 : camera.height // 2, camera.width // 3 : camera.width // 2] -= 0.2
-    return DepthImage(depth=depth, rgb=colour_word(stamp_ns, camera).rgb, intrinsics=camera, stamp_ns=stamp_ns)
+    return DepthImage(depth=depth, rgb=colour_image(stamp_ns, camera).rgb, intrinsics=camera, stamp_ns=stamp_ns)
 
 
-def colour_word(stamp_ns: int = SECOND, camera: Intrinsics = SMALL) -> ColourImage:
+def colour_image(stamp_ns: int = SECOND, camera: Intrinsics = SMALL) -> ColourImage:
     """A picture with a pattern."""
     v, u = np.mgrid[: camera.height, : camera.width]
     grey = ((u * 7 + v * 13) % 256).astype(np.uint8)
     return ColourImage(rgb=np.repeat(grey[..., None], 3, axis=-1), stamp_ns=stamp_ns)
 
 
-def detections_word(stamp_ns: int = SECOND, camera: Intrinsics = SMALL) -> Detections:
+def two_detections(stamp_ns: int = SECOND, camera: Intrinsics = SMALL) -> Detections:
     """Two boxes."""
     share = np.array([[0.3, 0.3, 0.6, 0.6], [0.0, 0.5, 0.5, 1.0]], np.float32)
     xyxy = share * np.array([camera.width, camera.height] * 2, np.float32)
@@ -67,7 +67,7 @@ def detections_word(stamp_ns: int = SECOND, camera: Intrinsics = SMALL) -> Detec
     return Detections(xyxy=xyxy, score=score, label=("cup", "tv"), image_hw=hw, stamp_ns=stamp_ns)
 
 
-def frame_word(stamp_ns: int = SECOND, step: int = 4) -> Frame:
+def drawn_frame(stamp_ns: int = SECOND, step: int = 4) -> Frame:
     """The registrar's drawn place, its view and its objects thinned."""
     full = drawn(stamp_ns)
     camera = full.view.intrinsics.scaled(step)
@@ -93,7 +93,7 @@ def odometry_message(stamp_ns: int = SECOND, x: float = 0.0) -> Odometry:
     """A body at x."""
     T = np.eye(4)
     T[0, 3] = x
-    return to_msg.odometry(OdometryWord(T_odom_body=T, stamp_ns=stamp_ns))
+    return to_msg.odometry(OdometryData(T_odom_body=T, stamp_ns=stamp_ns))
 
 
 def constraint_message(from_ns: int = SECOND, to_ns: int = 9 * SECOND, x: float = 0.0) -> Odometry:
@@ -106,17 +106,17 @@ def constraint_message(from_ns: int = SECOND, to_ns: int = 9 * SECOND, x: float 
     )
 
 
-def _encoded(word: ColourImage) -> list[Any]:
+def _encoded(image: ColourImage) -> list[Any]:
     """The same picture raw in every encoding, and compressed by whatever OpenCV writes."""
-    grey = word.rgb[..., 0]
-    four = np.dstack([word.rgb, grey])
-    rasters: dict[str, Any] = {"rgb8": word.rgb, "bgr8": word.rgb, "8UC3": word.rgb}
+    grey = image.rgb[..., 0]
+    four = np.dstack([image.rgb, grey])
+    rasters: dict[str, Any] = {"rgb8": image.rgb, "bgr8": image.rgb, "8UC3": image.rgb}
     rasters |= dict.fromkeys(("rgba8", "bgra8", "8UC4"), four) | {"mono8": grey, "8UC1": grey}
     rasters["mono16"] = grey.astype(np.uint16) * 256
     raw = [to_msg._raster(pixels, name, SECOND, "camera") for name, pixels in rasters.items()]
     header = to_msg.header(SECOND, "camera")
     kinds = [kind for kind in ("png", "jpg", "bmp", "tiff", "webp", "ppm", "gif") if cv2.haveImageWriter(f".{kind}")]
-    files = [(kind, cv2.imencode(f".{kind}", word.rgb)[1].tobytes()) for kind in (*kinds[:2] * 4, *kinds)]
+    files = [(kind, cv2.imencode(f".{kind}", image.rgb)[1].tobytes()) for kind in (*kinds[:2] * 4, *kinds)]
     small = [CompressedImage(header=header, format=kind, data=data) for kind, data in files]
     return [*raw, *small, CompressedImage(header=header, format="png", data=bomb(8_000, 1))]
 
@@ -131,21 +131,21 @@ def bomb(side: int, bits: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
-def _encoded_depth(word: DepthImage) -> list[Any]:
-    header, millimetres = to_msg.header(SECOND, "camera"), np.rint(word.depth * 1000).astype(np.uint16)
+def _encoded_depth(image: DepthImage) -> list[Any]:
+    header, millimetres = to_msg.header(SECOND, "camera"), np.rint(image.depth * 1000).astype(np.uint16)
     png = cv2.imencode(".png", millimetres)[1].tobytes()
     constants = b"\0\0\0\0" + np.array([100.0, 0.0], "<f4").tobytes()
     files = {"16UC1; compressedDepth": bytes(12) + png, "32FC1; compressedDepth png": constants + png, "png": png}
     small = [CompressedImage(header=header, format=kind, data=data) for kind, data in files.items()]
-    return [to_msg.depth_image(word), to_msg.depth_image(word, True), *small]
+    return [to_msg.depth_image(image), to_msg.depth_image(image, True), *small]
 
 
-def clouds(word: DepthImage) -> list[Any]:
+def clouds(image: DepthImage) -> list[Any]:
     """Organised and not, with colour and without."""
-    camera = word.intrinsics
-    xyz = back_project(word.depth, camera.fx, camera.fy, camera.cx, camera.cy).astype(np.float32)
+    camera = image.intrinsics
+    xyz = back_project(image.depth, camera.fx, camera.fy, camera.cx, camera.cy).astype(np.float32)
     flat = xyz.reshape(1, -1, 3)
-    cut = [(xyz, word.rgb), (xyz, None), (flat, word.rgb.reshape(1, -1, 3)), (flat, None)]  # type: ignore[union-attr]
+    cut = [(xyz, image.rgb), (xyz, None), (flat, image.rgb.reshape(1, -1, 3)), (flat, None)]  # type: ignore[union-attr]
     return [to_msg.points(PointCloud(xyz=points, rgb=rgb, stamp_ns=SECOND)) for points, rgb in cut]
 
 
@@ -222,18 +222,18 @@ def written(message: Any, stamp_ns: int | None = None) -> Any:
 
 def use_image(message: Any) -> None:
     """As the detector reads it."""
-    word = from_msg.image(message)
-    if word.rgb.size < MOST_WRITTEN:
-        written(to_msg.image(word), word.stamp_ns)
+    image = from_msg.image(message)
+    if image.rgb.size < MOST_WRITTEN:
+        written(to_msg.image(image), image.stamp_ns)
 
 
 def use_depth(message: Any, info: Any, colour: Any) -> None:
     """As the segmenter reads depth."""
-    word = from_msg.depth_image(message, info, colour)
-    if not (np.isfinite(word.depth) & (word.depth >= 0)).all():
-        raise WrongAnswerError(f"depth: NaN, infinite or negative: {word.depth.min()} … {word.depth.max()}")
-    if word.depth.size < MOST_WRITTEN:
-        written(to_msg.depth_image(word), word.stamp_ns)
+    image = from_msg.depth_image(message, info, colour)
+    if not (np.isfinite(image.depth) & (image.depth >= 0)).all():
+        raise WrongAnswerError(f"depth: NaN, infinite or negative: {image.depth.min()} … {image.depth.max()}")
+    if image.depth.size < MOST_WRITTEN:
+        written(to_msg.depth_image(image), image.stamp_ns)
 
 
 def use_info(info: Any) -> None:
@@ -244,43 +244,43 @@ def use_info(info: Any) -> None:
 
 def use_cloud(message: Any, info: Any) -> None:
     """As the segmenter reads a cloud."""
-    word = from_msg.point_cloud(message)
-    depth = organise(word, camera_from_msg.camera_of_cloud(info, word))
+    cloud = from_msg.point_cloud(message)
+    depth = organise(cloud, camera_from_msg.camera_of_cloud(info, cloud))
     if depth.depth.size < MOST_WRITTEN:
-        written(to_msg.depth_image(depth), word.stamp_ns)
+        written(to_msg.depth_image(depth), cloud.stamp_ns)
 
 
 def use_detections(message: Any, said: Any) -> None:
     """As the segmenter reads detections, and as the detector writes them."""
     names = from_msg.labels(said)
-    word = from_msg.detections(message, names, (30, 40))
+    detections = from_msg.detections(message, names, (30, 40))
     written(to_msg.labels(names))
-    written(to_msg.detections_table(word, names), word.stamp_ns)
+    written(to_msg.detections_table(detections, names), detections.stamp_ns)
 
 
 def use_odometry(before: Any, after: Any) -> None:
     """As registrar and mapper read odometry."""
-    words = [motion_from_msg.odometry(before), motion_from_msg.odometry(after)]
-    between = (words[0].stamp_ns + words[1].stamp_ns) // 2
-    T = motion_from_msg.pose_at(between, words)
-    motion_from_msg.level_gravity(between, words)
+    odometry = [motion_from_msg.odometry(before), motion_from_msg.odometry(after)]
+    between = (odometry[0].stamp_ns + odometry[1].stamp_ns) // 2
+    T = motion_from_msg.pose_at(between, odometry)
+    motion_from_msg.level_gravity(between, odometry)
     if not np.isfinite(T).all():
         raise WrongAnswerError(f"a pose between two is {T.tolist()}")
-    written(to_msg.odometry(words[0]), words[0].stamp_ns)
+    written(to_msg.odometry(odometry[0]), odometry[0].stamp_ns)
 
 
 def use_constraint(message: Any) -> None:
     """As the mapper reads a constraint."""
-    word = from_msg.loop_closure(message)
-    written(to_msg.constraint(word), word.to_ns)
-    written(to_msg.finished("mapper", word.to_ns), word.to_ns)
+    closure = from_msg.loop_closure(message)
+    written(to_msg.constraint(closure), closure.to_ns)
+    written(to_msg.finished("mapper", closure.to_ns), closure.to_ns)
 
 
 def use_frame(objects: Any, view: Any, info: Any, gravity: Any, said: Any, before: Any, after: Any) -> None:
     """As the registrar reads a frame, and as the segmenter writes it."""
     names = from_msg.labels(said)
-    words = [motion_from_msg.odometry(before), motion_from_msg.odometry(after)]
-    frame = from_msg.frame(objects, view, info, gravity, names, words)
+    odometry = [motion_from_msg.odometry(before), motion_from_msg.odometry(after)]
+    frame = from_msg.frame(objects, view, info, gravity, names, odometry)
     written(to_msg.objects(frame, names), frame.stamp_ns)
     for message in (to_msg.view(frame), to_msg.view_camera_info(frame), to_msg.gravity(frame)):
         written(message, frame.stamp_ns)
@@ -332,29 +332,29 @@ Goods = Callable[[], list[tuple[Any, ...]]]
 
 
 def _depths() -> list[tuple[Any, ...]]:
-    word = depth_word()
-    info, colours = to_msg.camera_info(word.intrinsics, SECOND, "camera"), _encoded(colour_word())[:12]
-    return [(depth, info, colours[k % len(colours)]) for k, depth in enumerate(_encoded_depth(word) * 3)]
+    image = depth_image()
+    info, colours = to_msg.camera_info(image.intrinsics, SECOND, "camera"), _encoded(colour_image())[:12]
+    return [(depth, info, colours[k % len(colours)]) for k, depth in enumerate(_encoded_depth(image) * 3)]
 
 
 def _clouds() -> list[tuple[Any, ...]]:
     info = to_msg.camera_info(SMALL, SECOND, "camera")
-    return [(cloud, info) for cloud in clouds(depth_word())]
+    return [(cloud, info) for cloud in clouds(depth_image())]
 
 
 def _frames() -> list[tuple[Any, ...]]:
-    word = frame_word()
-    bare = replace(word, objects=tuple(replace(o, rgb=None) for o in word.objects), support=None)
+    full = drawn_frame()
+    bare = replace(full, objects=tuple(replace(o, rgb=None) for o in full.objects), support=None)
     ends = odometry_message(), odometry_message(2 * SECOND, 0.1)
-    return [(*frame_messages(frame), *ends) for frame in (word, bare, replace(word, objects=(), gravity=None))]
+    return [(*frame_messages(frame), *ends) for frame in (full, bare, replace(full, objects=(), gravity=None))]
 
 
 DECODERS: dict[str, tuple[Goods, Use, float]] = {
-    "image": (lambda: [(m,) for m in _encoded(colour_word())], use_image, 1.0),
+    "image": (lambda: [(m,) for m in _encoded(colour_image())], use_image, 1.0),
     "depth": (_depths, use_depth, 1.0),
     "camera_info": (lambda: [(to_msg.camera_info(SMALL, SECOND, "camera"),)], use_info, 0.7),
     "points": (_clouds, use_cloud, 1.0),
-    "detections": (lambda: [(to_msg.detections_table(detections_word(), NAMES), to_msg.labels(NAMES))],
+    "detections": (lambda: [(to_msg.detections_table(two_detections(), NAMES), to_msg.labels(NAMES))],
                    use_detections, 1.0),
     "odom": (lambda: [(odometry_message(), odometry_message(2 * SECOND, 0.1))], use_odometry, 0.7),
     "constraints": (lambda: [(constraint_message(),)], use_constraint, 0.7),

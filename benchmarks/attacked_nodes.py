@@ -2,7 +2,7 @@
 """The live nodes under attack: each in a process of its own, in a namespace of its own.
 
 Batches of spoilt messages are published on every topic that a node listens to, with good ones among them. After each
-batch a good frame must come through within seconds, the process must live, and in the end its books must balance. A
+batch a good frame must come through within seconds, the process must live, and in the end its counters must balance. A
 trial is a message; the seed of a batch is that of its dice.
 """
 
@@ -36,7 +36,7 @@ GOOD = 0.3  # of the frames in a batch
 
 
 @dataclass(frozen=True)
-class Room:
+class Inputs:
     """What a node is sent: the messages of one frame by topic, the first of them being the frame."""
 
     frame: Callable[[int], dict[str, Any]]
@@ -45,19 +45,19 @@ class Room:
 
 
 def _detector(stamp_ns: int) -> dict[str, Any]:
-    return {"image": to_msg.image(good.colour_word(stamp_ns))}
+    return {"image": to_msg.image(good.colour_image(stamp_ns))}
 
 
 def _segmenter(stamp_ns: int) -> dict[str, Any]:
-    word, camera = good.depth_word(stamp_ns), good.SMALL
-    xyz = back_project(word.depth, camera.fx, camera.fy, camera.cx, camera.cy).astype("f4")
-    cloud = to_msg.points(good.PointCloud(xyz=xyz, rgb=word.rgb, stamp_ns=stamp_ns))
-    table = to_msg.detections_table(good.detections_word(stamp_ns), good.NAMES)
+    image, camera = good.depth_image(stamp_ns), good.SMALL
+    xyz = back_project(image.depth, camera.fx, camera.fy, camera.cx, camera.cy).astype("f4")
+    cloud = to_msg.points(good.PointCloud(xyz=xyz, rgb=image.rgb, stamp_ns=stamp_ns))
+    table = to_msg.detections_table(good.two_detections(stamp_ns), good.NAMES)
     return {"points": cloud, "detections_table": table, "camera_info": to_msg.camera_info(camera, stamp_ns, "camera")}
 
 
 def _registrar(stamp_ns: int) -> dict[str, Any]:
-    objects, view, info, gravity, _ = good.frame_messages(good.frame_word(stamp_ns))
+    objects, view, info, gravity, _ = good.frame_messages(good.drawn_frame(stamp_ns))
     said = {"objects": objects, "view": view, "view/camera_info": info, "gravity": gravity}
     return {**said, "odom": good.odometry_message(stamp_ns, (stamp_ns / good.SECOND) % 100)}
 
@@ -73,23 +73,23 @@ def _labels() -> dict[str, Any]:
 
 
 STAGES = {
-    "detector": Room(_detector, dict),
-    "segmenter": Room(_segmenter, _labels),
-    "registrar": Room(_registrar, _labels),
-    "mapper": Room(_mapper, dict),
-    "keyframer": Room(_registrar, _labels, "keyframes"),
+    "detector": Inputs(_detector, dict),
+    "segmenter": Inputs(_segmenter, _labels),
+    "registrar": Inputs(_registrar, _labels),
+    "mapper": Inputs(_mapper, dict),
+    "keyframer": Inputs(_registrar, _labels, "keyframes"),
 }
 
 
 def run_live(target: str, seconds: float, first: int) -> Tally:
     """Attack a live node for so long, in one batch at least; the first batch is that of seed ``first``."""
-    kind, room = target.split(" ")
-    return besieged(SIEGES[kind], room, seconds, first)
+    kind, stage = target.split(" ")
+    return besieged(SIEGES[kind], stage, seconds, first)
 
 
-def besieged(siege: type[Siege], room: str, seconds: float, first: int) -> Tally:
+def besieged(siege: type[Siege], stage: str, seconds: float, first: int) -> Tally:
     """What comes of the batches of one siege."""
-    with tempfile.TemporaryDirectory() as name, closing(siege(room, Path(name))) as live:
+    with tempfile.TemporaryDirectory() as name, closing(siege(stage, Path(name))) as live:
         began, seed = time.monotonic(), first
         try:
             while seed == first or time.monotonic() - began < seconds:
@@ -106,14 +106,14 @@ class Siege:
 
     DOMAIN = 48
 
-    def __init__(self, room: str, folder: Path) -> None:
+    def __init__(self, stage: str, folder: Path) -> None:
         from std_msgs.msg import Header
 
-        self.name, self.room, self.tally, self.folder = room, STAGES[room], Tally(), folder
-        self.graph = borrowed("ros/graph.py").Graph(self.DOMAIN + list(STAGES).index(room), folder)
+        self.name, self.inputs, self.tally, self.folder = stage, STAGES[stage], Tally(), folder
+        self.graph = borrowed("ros/graph.py").Graph(self.DOMAIN + list(STAGES).index(stage), folder)
         self.graph.receive(Header, "/finished")
         self._options = ["-p reliable:=true", *self.options()]
-        if room == "detector":
+        if stage == "detector":
             tiny = borrowed("detector/tiny_model.py")
             (folder / "labelmap.txt").write_text("cup\ntv\n")
             boxes = tiny.tf_outputs([[0.3, 0.3, 0.7, 0.7]], [0], [0.9])
@@ -123,8 +123,8 @@ class Siege:
 
     def _start(self) -> None:
         """Start the node and see a good frame through."""
-        self.graph.start(f"/{self.name}", self.room.package or self.name, *self._options)
-        for topic, message in {**self.room.before(), **self.room.frame(self._now_ns)}.items():
+        self.graph.start(f"/{self.name}", self.inputs.package or self.name, *self._options)
+        for topic, message in {**self.inputs.before(), **self.inputs.frame(self._now_ns)}.items():
             self._connect(topic, message)
         self._sees_good(START_S)
         self._began_mb = _peak_mb(self.pid)
@@ -160,7 +160,7 @@ class Siege:
             self._bury(seed)
         elif not self._sees_good(THROUGH_S):
             kind = "hang" if self._alive() else "death"
-            self.tally.find(seed, kind, f"no good frame within {THROUGH_S:.0f} s", self._last_words())
+            self.tally.find(seed, kind, f"no good frame within {THROUGH_S:.0f} s", self._last_line())
             self._restart()
         elif (grown := _peak_mb(self.pid) - self._began_mb) > GREED_MB:
             self.tally.find(seed, "greed", f"{grown:.0f} MB", "")
@@ -175,7 +175,7 @@ class Siege:
     def _send_one(self, draw: random.Random) -> None:
         """One frame: whole, or with some of its messages spoilt, lost or of another time."""
         self._now_ns += STEP_NS
-        messages = {**self.room.frame(self._now_ns), **(self.room.before() if draw.random() < 0.1 else {})}
+        messages = {**self.inputs.frame(self._now_ns), **(self.inputs.before() if draw.random() < 0.1 else {})}
         spoil = draw.random() > GOOD
         for topic, message in messages.items():
             if spoil and draw.random() < 0.6:
@@ -195,49 +195,49 @@ class Siege:
         """Whether a good frame is published within so long; frames come at the rate of a camera."""
         until = time.monotonic() + seconds
         stamps: set[int] = set()
-        for topic, message in self.room.before().items():
+        for topic, message in self.inputs.before().items():
             self._publish(topic, message)
         while time.monotonic() < until and self._alive():
             self._now_ns += STEP_NS
             stamps.add(self._now_ns)
-            for topic, message in self.room.frame(self._now_ns).items():
+            for topic, message in self.inputs.frame(self._now_ns).items():
                 self._publish(topic, message)
             for _ in range(5):
                 self.graph.executor.spin_once(timeout_sec=0.02)
-            told = self.graph.received["/finished"]
-            if any(m.frame_id == f"{self.name} published" and stamp_of(m) in stamps for m in told):
-                told.clear()
+            finished = self.graph.received["/finished"]
+            if any(m.frame_id == f"{self.name} published" and stamp_of(m) in stamps for m in finished):
+                finished.clear()
                 return True
         return False
 
     def settle(self, seed: int) -> None:
-        """The books of the node balance: received = published + waiting + dropped."""
+        """The counters of the node balance: received = published + waiting + dropped."""
         node = f"/{self.name}"
         self.graph.counters.pop(node, None)
         until = time.monotonic() + THROUGH_S
         while node not in self.graph.counters and time.monotonic() < until and self._alive():
             self.graph.executor.spin_once(timeout_sec=0.1)
-        book = self.graph.counters.get(node)
-        if book is None:
-            self.tally.find(seed - 1, "hang", "no books on /diagnostics", self._last_words())
-        elif book.received != book.published + book.waiting + sum(book.dropped.values()):
-            self.tally.find(seed - 1, "wrong", f"the books do not balance: {replace(book, stage_ms={})}", "")
+        counters = self.graph.counters.get(node)
+        if counters is None:
+            self.tally.find(seed - 1, "hang", "no counters on /diagnostics", self._last_line())
+        elif counters.received != counters.published + counters.waiting + sum(counters.dropped.values()):
+            self.tally.find(seed - 1, "wrong", f"the counters do not balance: {replace(counters, stage_ms={})}", "")
         else:
-            self.tally.refused += sum(book.dropped.values())
+            self.tally.refused += sum(counters.dropped.values())
 
     def _alive(self) -> bool:
         return bool(self.graph.alive(f"/{self.name}"))
 
     def _bury(self, seed: int) -> None:
         status = self.graph.processes[f"/{self.name}"].poll()
-        self.tally.find(seed, "death", f"exit status {status}", self._last_words())
+        self.tally.find(seed, "death", f"exit status {status}", self._last_line())
         self._restart()
 
     def _restart(self) -> None:
         self.graph.stop(f"/{self.name}", 9)
         self._start()
 
-    def _last_words(self) -> str:
+    def _last_line(self) -> str:
         lines = [line for line in self.graph.log(f"/{self.name}").splitlines() if line.strip()]
         return lines[-1][:200] if lines else ""
 
@@ -274,4 +274,4 @@ def _peak_mb(pid: int) -> float:
 
 
 SIEGES: dict[str, type[Siege]] = {"live": Siege}
-TARGETS = {f"live {room}": share for room, share in SHARES.items()}
+TARGETS = {f"live {stage}": share for stage, share in SHARES.items()}

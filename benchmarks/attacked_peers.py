@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from attacked_messages import SECOND, frame_word
+from attacked_messages import SECOND, drawn_frame
 from edits import edited_text
 from mutation import flipped
 from trials import Attempt, Target, WrongAnswerError
@@ -148,7 +148,7 @@ class Side:
 
     def _seen(self) -> Iterable[Any]:
         for k in range(2):
-            self.registrar.track(frame_word((1 + 10 * k) * SECOND, 4))
+            self.registrar.track(drawn_frame((1 + 10 * k) * SECOND, 4))
             (window,) = self.registrar.end_windows()
             yield self.registrar.search(window)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rooms under attack: what decodes is handed on to detector, segmenter, registrar and map.
+"""The stages under attack: what decodes is handed on to detector, segmenter, registrar and map.
 
-A room may refuse a word with ValueError or OSError. A crash of a kernel ends the process, which `trials` counts.
+A stage may refuse a message with ValueError or OSError. A crash of a kernel ends the process, which `trials` counts.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from attacked_messages import (
     _encoded,
     _encoded_depth,
     clouds,
-    colour_word,
+    colour_image,
     constraint_message,
-    depth_word,
-    detections_word,
+    depth_image,
+    drawn_frame,
     frame_messages,
-    frame_word,
     odometry_message,
     trial,
+    two_detections,
     written,
 )
 from mutation import mutated
@@ -62,18 +62,18 @@ def detect_attempt(_: Path) -> Attempt:
         found = detector.detect(from_msg.image(message))
         written(to_msg.detections_table(found, names), found.stamp_ns)
 
-    return partial(trial, [(message,) for message in _encoded(colour_word(camera=CAMERA))], use)
+    return partial(trial, [(message,) for message in _encoded(colour_image(camera=CAMERA))], use)
 
 
 def segment_attempt(_: Path) -> Attempt:
     """Depth or a cloud, detections and labels through the segmenter."""
     segmenter = Segmenter(SegmenterParams())
-    word = depth_word(camera=CAMERA)
+    image = depth_image(camera=CAMERA)
     info = to_msg.camera_info(CAMERA, SECOND, "camera")
-    colour = to_msg.image(colour_word(camera=CAMERA))
-    rest = to_msg.detections_table(detections_word(camera=CAMERA), NAMES), to_msg.labels(NAMES)
-    pictures = [(depth, info, colour, *rest) for depth in _encoded_depth(word)]
-    points = [(cloud, info, colour, *rest) for cloud in clouds(word)]
+    colour = to_msg.image(colour_image(camera=CAMERA))
+    rest = to_msg.detections_table(two_detections(camera=CAMERA), NAMES), to_msg.labels(NAMES)
+    pictures = [(depth, info, colour, *rest) for depth in _encoded_depth(image)]
+    points = [(cloud, info, colour, *rest) for cloud in clouds(image)]
 
     def use(depth: Any, camera: Any, picture: Any, boxes: Any, said: Any) -> None:
         names = from_msg.labels(said)
@@ -107,7 +107,9 @@ def _segment(segmenter: Segmenter, detections: Detections, depth: DepthImage, na
 def register_attempt(_: Path) -> Attempt:
     """Frames through a registrar: the same place twice, one time or both spoilt."""
     params = RegistrarParams(threads=1, min_gap=1.0)
-    goods = [(frame_messages(frame_word(k, step)), frame_messages(frame_word(k, step))) for k, step in ((0, 2), (0, 4))]
+    goods = [
+        (frame_messages(drawn_frame(k, step)), frame_messages(drawn_frame(k, step))) for k, step in ((0, 2), (0, 4))
+    ]
 
     def attempt(draw: random.Random) -> None:
         pair = draw.choice(goods)
@@ -152,11 +154,11 @@ def map_attempt(_: Path) -> Attempt:
         for k, message in enumerate(way):
             if k == spoilt_way and draw.random() < 0.5:
                 message = _with_stamp(mutated(draw, message), (1 + k) * SECOND)
-            for word in _readable(motion_from_msg.odometry, message):
-                graph.add_odometry(word)
+            for odometry in _readable(motion_from_msg.odometry, message):
+                graph.add_odometry(odometry)
         for message in (mutated(draw, draw.choice(ties)), ties[0], mutated(draw, draw.choice(ties)), ties[-1]):
-            for word in _readable(from_msg.loop_closure, message):
-                _tie(graph, word)
+            for closure in _readable(from_msg.loop_closure, message):
+                _tie(graph, closure)
             _solve(graph)
 
     return attempt
@@ -174,9 +176,9 @@ def _readable(decode: Any, message: Any) -> Iterator[Any]:
         return
 
 
-def _tie(graph: PoseGraph, word: Any) -> None:
+def _tie(graph: PoseGraph, closure: Any) -> None:
     try:
-        graph.add_closure(word)
+        graph.add_closure(closure)
     except ValueError:
         return
 

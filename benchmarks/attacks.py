@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Attacks: spoilt messages into every decoder, room and live node, hostile peers, files and servers.
+"""Attacks: spoilt messages into every decoder, stage and live node, hostile peers, files and servers.
 
     python benchmarks/attacks.py --seconds 900 --json attacks.json
     python benchmarks/attacks.py --only frame --seed 1234
@@ -9,7 +9,7 @@ For each target the trials, how many of them were refused as they should be (Val
 5 s of the processor, or 30 s of waiting), ``greed`` (more than 500 MB), ``wrong`` (an answer that is not true, without
 an error) and ``outside`` (a file written outside of the folder that was given). The JSON holds every kind of finding
 with seeds; ``--only TARGET --seed S`` makes that trial again, and shows the traceback. ``decoded`` are the messages
-that went through decoders and rooms, ``live`` those that were published to nodes in processes of their own, and the
+that went through decoders and stages, ``live`` those that were published to nodes in processes of their own, and the
 calls of their services. The exit status is 1 where anything was found. The groups of targets:
 
 \b
@@ -94,7 +94,7 @@ def summary(rows: dict[str, dict[str, Any]]) -> dict[str, Any]:
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """The rows as text."""
     head = ("target", "tries", "refused", *KINDS)
-    lines = ["".join(f"{word:>9}" if k else f"{word:<20}" for k, word in enumerate(head))]
+    lines = ["".join(f"{title:>9}" if k else f"{title:<20}" for k, title in enumerate(head))]
     for name, row in rows.items():
         lines.append(f"{name:<20}" + "".join(f"{row[key]:>9}" for key in head[1:]))
         for found in row["findings"]:
@@ -121,7 +121,7 @@ def replay(name: str, seed: int) -> bool:
 
 
 def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...]:
-    asked = NAMES if text is None else tuple(n for word in text.split(",") for n in BY_GROUP.get(word, [word]))
+    asked = NAMES if text is None else tuple(n for part in text.split(",") for n in BY_GROUP.get(part, [part]))
     if set(asked) - set(NAMES):
         raise click.BadParameter(f"expected some of {','.join((*BY_GROUP, *NAMES))}, got {text!r}")
     return asked

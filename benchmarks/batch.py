@@ -5,7 +5,7 @@
     python benchmarks/batch.py --simulate 24 --workers 1,2,4
 
 Every run begins with warm code on disk. The last one has the last count of workers again, and one of its
-processes is killed midway: the time that it takes longer is told in the median time of one recording.
+processes is killed midway: the time that it takes longer shows in the median time of one recording.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TABLES = ("constraints", "refusals")
 def measure(
     recordings: Sequence[Path], workers: int, folder: Path, receive: Callable[[int], None] = lambda ended: None
 ) -> dict[str, Any]:
-    """The figures of one run over all recordings; ``receive`` is told how many have ended."""
+    """The figures of one run over all recordings; ``receive`` gets how many have ended."""
     settings = read_settings(None, ["registrar.threads=1", "detector.threads=1"])
     work = BatchWork.of(RecordedOptions(settings), folder, ("batch",))
     start, ended = time.perf_counter(), list[Done[Path, str]]()

@@ -36,7 +36,7 @@ ORACLE_COVARIANCE = np.diag([0.005**2] * 3 + [np.radians(0.2) ** 2] * 3)
 
 @dataclass
 class Result:
-    """What one method made of one recording; seconds are the processor's, so that a busy machine tells the same."""
+    """What one method made of one recording; seconds are the processor's, so that a busy machine gives the same."""
 
     closures: list[LoopClosure]
     pairs: int

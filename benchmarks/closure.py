@@ -173,7 +173,7 @@ def jitter_of(context: click.Context, parameter: click.Parameter, text: str) -> 
 
 
 def _require_own_names(names: Sequence[str]) -> None:
-    """Figures are kept and told by the name of the recording; `click.UsageError` where two have one."""
+    """Figures are kept and shown by the name of the recording; `click.UsageError` where two have one."""
     twice = sorted(name for name, count in Counter(names).items() if count > 1)
     if twice:
         raise click.UsageError(f"expected recordings of different names, got more than one {', '.join(twice)}")

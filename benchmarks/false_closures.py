@@ -39,7 +39,7 @@ from objreg_tools.truth import LOOSE, Truth, summarise, within
 from objreg_tools.workers import spread
 
 EAGER = {"candidates": 10, "closures": 10, "thin_seconds": 0.2, "threads": 1}
-STORIES = (
+PLANS = (
     "look-alikes:82",
     "moved:103:stress",
     "opposite:121:stress",
@@ -54,7 +54,7 @@ STORIES = (
 HEAD = f"{'recording':32} {'tried':>6} {'accepted':>9} {'strict':>7} {'loose':>6} {'false':>6}  refused, though right"
 
 
-class Told(NamedTuple):
+class Plan(NamedTuple):
     """What is simulated."""
 
     scenario: str
@@ -66,19 +66,19 @@ class Told(NamedTuple):
 
     @property
     def name(self) -> str:
-        """In words, as tables have it."""
+        """As tables have it."""
         sensor = [] if self.sensor == "kinect_v1" else [f"{self.sensor} depth"]
         rig = [setting.removeprefix("rig.") for setting in self.rig]
         return ", ".join([f"{self.scenario} {self.seed}", self.camera, *sensor, *rig, *["stress"] * self.stress])
 
 
-def told(text: str) -> Told:
+def plan_of(text: str) -> Plan:
     """``moved:103:qvga:sensor=azure_kinect:lag_ms=25:stress``; all behind the seed may be left out, in this order.
 
     `click.BadParameter` for anything else.
     """
     try:
-        return _told(*text.split(":"))
+        return _plan_of(*text.split(":"))
     except (TypeError, ValueError) as error:
         cameras = f"{', '.join(SCENARIOS)} and {', '.join(CAMERAS)}"
         why = f" ({error})" if "=" in text else ""
@@ -88,7 +88,7 @@ def told(text: str) -> Told:
         ) from error
 
 
-def _told(scenario: str, seed: str, *more: str) -> Told:
+def _plan_of(scenario: str, seed: str, *more: str) -> Plan:
     stress = more[-1:] == ("stress",)
     rest = more[: len(more) - stress]
     settings = dict(part.split("=", 1) for part in rest if "=" in part)
@@ -100,12 +100,12 @@ def _told(scenario: str, seed: str, *more: str) -> Told:
         raise ValueError(f"settings are sensor={'|'.join(SENSORS)}, lens= and those of the rig")
     if "lens" in settings:
         settings["distortion"] = distortion_of(settings.pop("lens"))
-    plan = Told(scenario, int(seed), camera, stress, sensor, tuple(f"rig.{k}={v}" for k, v in settings.items()))
+    plan = Plan(scenario, int(seed), camera, stress, sensor, tuple(f"rig.{k}={v}" for k, v in settings.items()))
     sensors_of(camera_of(camera, None), stress, plan.rig, sensor)  # refuses what is out of range
     return plan
 
 
-def measure(plan: Told, frames: int, model: str) -> dict[str, Any]:
+def measure(plan: Plan, frames: int, model: str) -> dict[str, Any]:
     """The figures of one recording, which is gone afterwards."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording"
@@ -138,9 +138,9 @@ def figures(closures: Sequence[LoopClosure], refused: Sequence[Rejected], truth:
 
 
 def counts(closures: Sequence[LoopClosure], truth: Truth) -> dict[str, int]:
-    """How many closures there are that the truth tells of, and how many of them are strict, loose and false."""
-    told = summarise(truth.errors(closures))
-    return {name: told[name] for name in ("count", "strict", "loose", "false")}
+    """How many closures there are that the truth knows, and how many of them are strict, loose and false."""
+    counted = summarise(truth.errors(closures))
+    return {name: counted[name] for name in ("count", "strict", "loose", "false")}
 
 
 def is_right(rejected: Rejected, truth: Truth) -> bool:
@@ -172,10 +172,10 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
     "--simulate",
     "plans",
     multiple=True,
-    default=STORIES,
+    default=PLANS,
     show_default=True,
     metavar="SCENARIO:SEED[:CAMERA][:SETTING=VALUE...][:stress]",
-    callback=lambda _context, _option, texts: [told(text) for text in texts],
+    callback=lambda _context, _option, texts: [plan_of(text) for text in texts],
     help="Simulate this; may be repeated.",
 )
 @click.option("--frames", type=click.IntRange(min=2), default=400, show_default=True, help="Frames of a recording.")
@@ -183,7 +183,7 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--processes", type=click.IntRange(min=1), default=2, show_default=True, help="Recordings at once.")
 @click.option("--scheduler", default="", metavar="tcp://HOST:PORT", help="A Dask cluster in place of this machine.")
-def main(plans: list[Told], frames: int, model: str, json_file: Path | None, processes: int, scheduler: str) -> None:
+def main(plans: list[Plan], frames: int, model: str, json_file: Path | None, processes: int, scheduler: str) -> None:
     """Hold every keyframe of simulated recordings against ten others, and count what is falsely accepted."""
     rows: dict[str, dict[str, Any]] = {}
     click.echo(HEAD)

@@ -31,7 +31,7 @@ class Meeting:
     later: str
     revisit: Revisit
 
-    def is_told_by(self, closure: LoopClosure) -> bool:
+    def is_tied_by(self, closure: LoopClosure) -> bool:
         """Whether a constraint ties the other robot to this keyframe, whichever of the two it calls *from*."""
         ends = ((closure.from_robot, closure.from_ns), (closure.to_robot, closure.to_ns))
         return any(
@@ -77,7 +77,7 @@ def judged(found: Sequence[Meeting], closures: Iterable[LoopClosure], truths: Tr
     between = [closure for closure in closures if closure.from_robot != closure.to_robot]
     errors = [(closure, error) for closure in between if (error := truths.error(closure)) is not None]
     right = [closure for closure, error in errors if within(error, LOOSE)]
-    closed = {meeting: any(map(meeting.is_told_by, right)) for meeting in found}
+    closed = {meeting: any(map(meeting.is_tied_by, right)) for meeting in found}
     parts = [(part[0], any(closed[meeting] for meeting in part)) for part in stretches(found)]
     pairs = sorted({(first.earlier, first.later) for first, _ in parts})
     return {
@@ -98,5 +98,5 @@ def judged(found: Sequence[Meeting], closures: Iterable[LoopClosure], truths: Tr
 
 
 def _counted(verdicts: Iterable[bool]) -> dict[str, int]:
-    told = list(verdicts)
-    return {"closed": sum(told), "of": len(told)}
+    closed = list(verdicts)
+    return {"closed": sum(closed), "of": len(closed)}

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from sources import TRUE_BOXES, detector_of, read_source
-from tables import table_story
+from tables import table_plan
 
 from objreg_ros.data.frames import Frame
 from objreg_ros.registrar.params import RegistrarParams
@@ -31,7 +31,7 @@ ROUNDS = 5  # every store has its turn in each, so that a machine that changes i
 def table_frames(folder: Path) -> list[Frame]:
     """The frames of one pass."""
     path = folder / "table"
-    write_plan(path, table_story(OBJECTS, FRAMES, 0), "table", 0, jpeg=True, threads=os.cpu_count() or 1)
+    write_plan(path, table_plan(OBJECTS, FRAMES, 0), "table", 0, jpeg=True, threads=os.cpu_count() or 1)
     with read_source(path, detector_of(TRUE_BOXES), 0) as source:
         return source.frames
 

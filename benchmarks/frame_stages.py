@@ -36,7 +36,7 @@ def stages_of(path: Path, composed: bool) -> tuple[int, dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder:
         os.environ[FOLDER] = folder
         setup = Setup(composed=composed, programs={name: ("timed_node", name) for name in names})
-        live = run_live(path, setup, Path(folder), lambda words: click.echo(words, err=True))
+        live = run_live(path, setup, Path(folder), lambda line: click.echo(line, err=True))
         return live.counters["registrar"].published, {
             name: json.loads(Path(folder, f"{name}.json").read_text()) for name in names
         }

@@ -140,7 +140,7 @@ class Peer:
         from objreg_ros.bridge.node import qos
 
         self._stamp_ns += STEP_NS
-        objects, view, info, _, _ = self._good.frame_messages(self._good.frame_word(self._stamp_ns))
+        objects, view, info, _, _ = self._good.frame_messages(self._good.drawn_frame(self._stamp_ns))
         tie = self._good.constraint_message(self._stamp_ns - 20 * STEP_NS, self._stamp_ns, x=0.2)
         topic, message = self._draw.choice(
             (("objects", objects), ("view", view), ("view/camera_info", info), ("constraints", tie))
@@ -214,7 +214,7 @@ def measure(path: Path, seconds: float, kinds: tuple[str, ...], hz: float, folde
         play(path, seconds)
         time.sleep(SETTLE_S)
         processes.require_alive()
-        said = {name: dict(gauge.told[f"{ROBOT}/{name}"]) for name in NODES}
+        said = {name: dict(gauge.latest[f"{ROBOT}/{name}"]) for name in NODES}
     return {
         "constraints": int(said["registrar"]["constraints"]),
         "frames": int(said["registrar"]["published"]),
@@ -226,7 +226,7 @@ def measure(path: Path, seconds: float, kinds: tuple[str, ...], hz: float, folde
 
 def _wait_for_nodes(gauge: Gauge, processes: Processes) -> None:
     wanted = {f"{ROBOT}/{name}" for name in NODES}
-    _wait(lambda: wanted <= gauge.told.keys(), processes, ", ".join(sorted(wanted)))
+    _wait(lambda: wanted <= gauge.latest.keys(), processes, ", ".join(sorted(wanted)))
 
 
 def _wait(done: Callable[[], bool], processes: Processes, what: str) -> None:

@@ -36,12 +36,12 @@ TUNSETIFF, TAP_OF_PLAIN_FRAMES = 0x400454CA, 0x0002 | 0x1000  # <linux/if_tun.h>
 PREFIX = "hosts"  # of all that is made; then the process that made it
 SMALLEST_FRAME = 1500  # bytes: what netem, which counts packets, holds at most in its queue of bytes
 NUMBERS = itertools.count()  # of the groups of hosts that this process made
-PATIENCE_S = 5.0  # for processes that were told to end
+PATIENCE_S = 5.0  # for processes that were asked to end
 
 
-def ip(*words: str) -> str:
+def ip(*arguments: str) -> str:
     """What the tool ``ip`` says; OSError where it says no."""
-    return tool("ip", *words)
+    return tool("ip", *arguments)
 
 
 def tool(*command: str) -> str:
@@ -85,16 +85,16 @@ def netem_works() -> bool:
 
 def netem(device: str, conditions: Conditions) -> list[str]:
     """The command of `tc` that makes what leaves a device as bad as these conditions."""
-    words = ["tc", "qdisc", "replace", "dev", device, "root", "netem"]
-    words += [
+    command = ["tc", "qdisc", "replace", "dev", device, "root", "netem"]
+    command += [
         "limit",
         str(max(1, conditions.queue_bytes // SMALLEST_FRAME)),
         "delay",
         f"{conditions.delay_s * 1e3:g}ms",
     ]
-    words += ["loss", f"{conditions.loss * 100:g}%"] if conditions.loss else []
+    command += ["loss", f"{conditions.loss * 100:g}%"] if conditions.loss else []
     rate = conditions.bits_per_second
-    return words + (["rate", f"{rate:.0f}bit"] if rate < float("inf") else [])
+    return command + (["rate", f"{rate:.0f}bit"] if rate < float("inf") else [])
 
 
 class Hosts:
@@ -205,7 +205,7 @@ def remove(name: str) -> None:
     """End what runs in a namespace, and take the namespace away; a veth in it goes with it."""
     signals = [signal.SIGTERM, signal.SIGKILL]
     deadline = time.monotonic() + PATIENCE_S
-    while pids := [int(word) for word in ip("netns", "pids", name).split()]:
+    while pids := [int(pid) for pid in ip("netns", "pids", name).split()]:
         for pid in pids:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signals[0])

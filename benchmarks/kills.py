@@ -103,9 +103,9 @@ class Robot:
 def kill_once(robot: Robot, folder: Path, store: Path, moment_s: float, count: Count) -> None:
     """Start a registrar, kill it so long after it announced its first keyframe, and look into the store."""
     robot.announced.clear()
-    words = ["--ros-args", "-p", f"store:={store}", "-p", "T_base_camera:=[0.0,0.0,0.0,0.0,0.0,0.0,1.0]"]
+    arguments = ["--ros-args", "-p", f"store:={store}", "-p", "T_base_camera:=[0.0,0.0,0.0,0.0,0.0,0.0,1.0]"]
     with Processes(folder, os.environ) as processes:
-        registrar = processes.start("registrar", "objreg_ros.registrar.node", [*words, "-p", "reliable:=true"])
+        registrar = processes.start("registrar", "objreg_ros.registrar.node", [*arguments, "-p", "reliable:=true"])
         deadline = time.monotonic() + START_S
         while not robot.announced and registrar.poll() is None and time.monotonic() < deadline:
             robot.go_on()

@@ -24,7 +24,7 @@ FIRST_OBJECT = 20  # labels of a cloud below it are the table; ten labels are th
 
 
 @dataclass(frozen=True)
-class Thing:
+class LabelledObject:
     """An object of an image: its class, the pixels ``mask (H, W) bool`` that measure it, and its true box."""
 
     label: str
@@ -38,7 +38,7 @@ class LabelledImage:
 
     name: str
     image: DepthImage
-    things: tuple[Thing, ...]
+    objects: tuple[LabelledObject, ...]
 
 
 def simulated_images(seed: int, count: int) -> Iterator[LabelledImage]:
@@ -48,22 +48,24 @@ def simulated_images(seed: int, count: int) -> Iterator[LabelledImage]:
         scene = random_scene(seed=1000 * seed + k)
         rendering = render(scene, random_view(scene, seed=k), seed=k)
         labelled = _of_rendering(f"room {1000 * seed + k}", rendering)
-        found, k = found + bool(labelled.things), k + 1
-        if labelled.things:
+        found, k = found + bool(labelled.objects), k + 1
+        if labelled.objects:
             yield labelled
 
 
 def _of_rendering(name: str, r: Rendering) -> LabelledImage:
     """A pixel shows an object where what was measured there is the object and not what is beside it."""
     sound = (r.depth > 0) & (np.abs(r.depth - r.true_depth) < 0.02 + 0.02 * r.true_depth**2)
-    things = []
+    objects = []
     for seen in r.objects:
         mask = (r.instance == seen.instance) & sound
         near = mask.any() and float(np.median(r.depth[mask])) < FARTHEST
         if near and seen.visibility >= LEAST_VISIBLE and np.count_nonzero(mask) >= LEAST_PIXELS:
             x0, y0, x1, y1 = seen.xyxy.tolist()
-            things.append(Thing(seen.label, mask, (x0, y0, x1, y1)))
-    return LabelledImage(name, DepthImage(depth=r.depth, rgb=r.rgb, intrinsics=r.intrinsics, stamp_ns=0), tuple(things))
+            objects.append(LabelledObject(seen.label, mask, (x0, y0, x1, y1)))
+    return LabelledImage(
+        name, DepthImage(depth=r.depth, rgb=r.rgb, intrinsics=r.intrinsics, stamp_ns=0), tuple(objects)
+    )
 
 
 def labelled_clouds(folder: Path) -> Iterator[LabelledImage]:
@@ -77,8 +79,10 @@ def labelled_clouds(folder: Path) -> Iterator[LabelledImage]:
         image = organise(PointCloud(xyz=xyz, rgb=rgb, stamp_ns=0))
         numbers = np.where(label >= FIRST_OBJECT, label // 10, 0)[..., 0]
         masks = [(numbers == n) & (image.depth > 0) for n in np.unique(numbers[numbers > 0])]
-        things = [Thing(path.stem.strip("0123456789"), mask, _box(mask)) for mask in masks if mask.sum() >= 300]
-        yield LabelledImage(path.stem, image, tuple(things))
+        objects = [
+            LabelledObject(path.stem.strip("0123456789"), mask, _box(mask)) for mask in masks if mask.sum() >= 300
+        ]
+        yield LabelledImage(path.stem, image, tuple(objects))
 
 
 def _shape(path: Path) -> tuple[int, int]:

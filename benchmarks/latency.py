@@ -29,12 +29,12 @@ from typing import Any
 
 import click
 import numpy as np
-from tables import RATE_HZ, table_story
+from tables import RATE_HZ, table_plan
 
 from objreg_tools.cli.live import STAGES, Live, Setup, run_live
 from objreg_tools.simulation.write import write_plan
 
-PROGRAMS = {**{room: f"objreg_ros.{room}.node" for room in STAGES}, "graph": "objreg_tools.graph"}
+PROGRAMS = {**{stage: f"objreg_ros.{stage}.node" for stage in STAGES}, "graph": "objreg_tools.graph"}
 TICKS = os.sysconf("SC_CLK_TCK")
 ORDER_S = 0.02  # messages of two topics that were sent in this order may come in the other
 
@@ -153,10 +153,10 @@ class Meter:
     def _run(self) -> None:
         while self._open:
             for pid in _children(os.getpid()):
-                room = next((name for name, module in PROGRAMS.items() if module in _command(pid)), None)
+                program = next((name for name, module in PROGRAMS.items() if module in _command(pid)), None)
                 sample = _sample(pid)
-                if room is not None and sample is not None:
-                    self.samples[room].append((time.monotonic(), *sample))
+                if program is not None and sample is not None:
+                    self.samples[program].append((time.monotonic(), *sample))
             time.sleep(1.0)
 
     def figures(self, start: float, stop: float) -> dict[str, dict[str, float]]:
@@ -167,13 +167,13 @@ class Meter:
         self._open = False
         self._thread.join()
         out = {}
-        for room, rows in self.samples.items():
+        for program, rows in self.samples.items():
             if len(rows) < 2:
                 continue
             at, seconds, memory, fair = np.array(rows).T
             cpu = 100 * np.diff(np.interp((start, stop), at, seconds))[0] / (stop - start)
             most = {"memory_mb": round(float(memory.max()), 1), "pss_mb": round(float(fair.max()), 1)}
-            out[room] = {"cpu_percent": round(float(cpu), 1), **most}
+            out[program] = {"cpu_percent": round(float(cpu), 1), **most}
         return out
 
 
@@ -214,11 +214,11 @@ def recorded(objects: int, frames: int, seed: int) -> Iterator[Path]:
     """The recording of a table, gone afterwards."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"table_{objects}")
-        write_plan(path, table_story(objects, frames, seed), "table", seed, jpeg=True)
+        write_plan(path, table_plan(objects, frames, seed), "table", seed, jpeg=True)
         yield path
 
 
-def books_of(live: Live) -> dict[str, Any]:
+def frames_of(live: Live) -> dict[str, Any]:
     """What became of every frame at every node, and how long its stages took."""
     return {
         node: {
@@ -238,14 +238,14 @@ def measure(path: Path, setup: Setup) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as logs:
         witness, meter = Witness(), Meter()
         try:
-            live = run_live(path, setup, Path(logs), lambda words: click.echo(words, err=True))
+            live = run_live(path, setup, Path(logs), lambda line: click.echo(line, err=True))
             usage = meter.figures(*witness.span)
             latency = {node: witness.latency_ms(node) for node in STAGES}
             constraints, search = witness.constraint_ms(), witness.search_ms()
         finally:
             witness.close()
         figures = {"end_to_end_ms": latency, "search_ms": search, "constraint_ms": constraints}
-        return {**figures, "books": books_of(live), "usage": usage}
+        return {**figures, "frames": frames_of(live), "usage": usage}
 
 
 def totals(usage: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
@@ -293,8 +293,10 @@ def main(
     os.environ.setdefault("ROS_DOMAIN_ID", str(random.randint(1, 100)))  # the witness listens there too
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     changes = {"model": model or None, "max_rate": max_rate}
-    words = [word for name, value in changes.items() if value is not None for word in ("-p", f"{name}:={value}")]
-    node_args = {"detector": words} if words else {}
+    arguments = [
+        argument for name, value in changes.items() if value is not None for argument in ("-p", f"{name}:={value}")
+    ]
+    node_args = {"detector": arguments} if arguments else {}
     rows = {}
     for count in (int(text) for text in objects.split(",")):
         with recorded(count, round(RATE_HZ * seconds), seed) as path:

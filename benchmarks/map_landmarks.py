@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Do objects help as landmarks in the pose graph? Their sightings as ranges and bearings beside the closures.
 
-Closures are made of the same sightings, so nothing here is independent of them. No sighting tells a yaw: that of an
+Closures are made of the same sightings, so nothing here is independent of them. No sighting gives a yaw: that of an
 object is known from two views laid upon each other, which is what a closure says.
 """
 
@@ -82,19 +82,19 @@ Where = Callable[[int], "Array | None"]  # the camera (4, 4) at a stamp
 
 
 def named(shown: Sequence[Shown], where: Where | None, closures: Sequence[LoopClosure] = ()) -> Names:
-    """By `Landmarks`, as the registrar does: from where objects are, if that is told, and what closures lay on what."""
+    """By `Landmarks`, as the registrar does: from where objects are, if known, and what closures lay on what."""
     placed = [_placed(one, where, k) for k, one in enumerate(shown)]
     numbers = {one.stamp_ns: k for k, one in enumerate(shown)}
     pairs: list[list[tuple[int, int, int]]] = [[] for _ in shown]
-    for word in closures:
-        if word.from_ns in numbers and word.to_ns in numbers:
-            there, here = numbers[word.from_ns], numbers[word.to_ns]
-            pairs[here] += [(i, there, j) for i, j in _laid_upon(shown[here], shown[there], word.T_from_to)]
+    for closure in closures:
+        if closure.from_ns in numbers and closure.to_ns in numbers:
+            there, here = numbers[closure.from_ns], numbers[closure.to_ns]
+            pairs[here] += [(i, there, j) for i, j in _laid_upon(shown[here], shown[there], closure.T_from_to)]
     return _in_turn(placed, pairs)
 
 
 def _placed(one: Shown, where: Where | None, number: int) -> tuple[Sighting, ...]:
-    """Its sightings; in a session for itself, which has nothing in common with others, where its place is not told."""
+    """Its sightings; in a session for itself, which has nothing in common with others, where its place is not known."""
     T = None if where is None else where(one.stamp_ns)
     session, T = (number, np.eye(4)) if T is None else (-1, T)
     middles = transform(T, one.xyz)
@@ -119,8 +119,8 @@ def _laid_upon(here: Shown, there: Shown, T_there_here: Array) -> list[tuple[int
 def _in_turn(placed: Sequence[tuple[Sighting, ...]], pairs: Sequence[Sequence[tuple[int, int, int]]]) -> Names:
     """The landmarks of keyframes in turn; ``pairs`` say which object is which of which keyframe before."""
     landmarks, known = Landmarks(RegistrarParams()), list[tuple[Sighting, ...]]()
-    for sightings, words in zip(placed, pairs, strict=True):
-        links = [Link(index=i, of=known[there][j], R_there_here=np.eye(3)) for i, there, j in words]
+    for sightings, matches in zip(placed, pairs, strict=True):
+        links = [Link(index=i, of=known[there][j], R_there_here=np.eye(3)) for i, there, j in matches]
         assigned, merged = landmarks.assign(sightings, links)
         landmarks.add_sightings(assigned, merged)
         known = [_renamed(row, merged) for row in known] + [assigned]
@@ -373,18 +373,19 @@ def _error_cm(case: Case, graph: PoseGraph, poses: Iterable[Array]) -> float:
     return 100 * absolute_trajectory_error([T for T, _ in known], [there for _, there in known])
 
 
-def table(name: str, told: dict[str, Any]) -> str:
+def table(name: str, figures: dict[str, Any]) -> str:
     """One recording as text: means over the drifts, in how many of these it is better than closures alone."""
     lines = [
-        f"{name}: {told['closures']} closures; {told['sightings']} sightings of {told['landmarks']} landmarks of"
-        f" {told['extent_cm']:.0f} cm, {told['across_cm']:.1f} cm across and {told['along_cm']:.1f} cm along the line"
-        f" of sight from their middles (sigmas: {told['shares'][0]:.2f} and {told['shares'][1]:.2f} of their extents)",
+        f"{name}: {figures['closures']} closures; {figures['sightings']} sightings of {figures['landmarks']} landmarks"
+        f" of {figures['extent_cm']:.0f} cm, {figures['across_cm']:.1f} cm across and {figures['along_cm']:.1f} cm"
+        f" along the line of sight from their middles (sigmas: {figures['shares'][0]:.2f} and"
+        f" {figures['shares'][1]:.2f} of their extents)",
         f"{'':38} {'mean cm':>8} {'least':>7} {'most':>7} {'/ alone':>8} {'better':>7} {'left out':>9}",
     ]
-    base = np.array(told["cm"][BASE])
-    for variant, values in told["cm"].items():
+    base = np.array(figures["cm"][BASE])
+    for variant, values in figures["cm"].items():
         cm = np.array(values)
-        out = f"{np.mean(told['left_out'][variant]):.1f}" if variant in told["left_out"] else "-"
+        out = f"{np.mean(figures['left_out'][variant]):.1f}" if variant in figures["left_out"] else "-"
         lines.append(
             f"{variant:38} {cm.mean():>8.2f} {cm.min():>7.2f} {cm.max():>7.2f} {cm.mean() / base.mean():>8.2f}"
             f" {(cm < base).sum():>4}/{len(cm):<2} {out:>9}"

@@ -37,12 +37,12 @@ def drawn(seed: int) -> tuple[Walk, dict[str, Any]]:
     return walk(params, seed), {"seed": seed, "false_share": share, "agreeing_share": agreeing, "worst_m": worst}
 
 
-def filled(words: Walk, right_only: bool, params: MapperParams | None = None) -> tuple[PoseGraph, Array, int]:
+def filled(walk: Walk, right_only: bool, params: MapperParams | None = None) -> tuple[PoseGraph, Array, int]:
     """A graph with a walk in it, unsolved; whether each closure in it is false, and how many were refused at once."""
     graph, is_false, refused = PoseGraph(params), list[bool](), 0
-    for odometry in words.odometry:
+    for odometry in walk.odometry:
         graph.add_odometry(odometry)
-    for closure, false in zip(words.closures, words.is_false.tolist(), strict=True):
+    for closure, false in zip(walk.closures, walk.is_false.tolist(), strict=True):
         if right_only and false:
             continue
         before = len(graph.ties)
@@ -54,9 +54,9 @@ def filled(words: Walk, right_only: bool, params: MapperParams | None = None) ->
     return graph, np.array(is_false, bool), refused
 
 
-def error_of(words: Walk, graph: PoseGraph, poses: Array) -> float:
+def error_of(walk: Walk, graph: PoseGraph, poses: Array) -> float:
     """The trajectory error of keyframes, m."""
-    true = [words.T_world_body[stamp // PERIOD_NS] for stamp in graph.keyframes.stamps_ns]
+    true = [walk.T_world_body[stamp // PERIOD_NS] for stamp in graph.keyframes.stamps_ns]
     return absolute_trajectory_error(list(poses), true) if np.isfinite(poses).all() else float("inf")
 
 
@@ -73,33 +73,33 @@ def one(seed: int, peers: list[str], params: MapperParams | None = None) -> dict
 
     None of a walk that met no place again or has no false closure.
     """
-    words, row = drawn(seed)
-    if words.is_false.all() or not words.is_false.any():
+    walk, row = drawn(seed)
+    if walk.is_false.all() or not walk.is_false.any():
         return None
-    graph, _, _ = filled(words, right_only=True, params=params)
-    clean = error_of(words, graph, solved(graph).poses)
+    graph, _, _ = filled(walk, right_only=True, params=params)
+    clean = error_of(walk, graph, solved(graph).poses)
     limit = graph.params.max_residual
     row["clean_m"], row["methods"] = clean, {}
     dense = Dense.of(graph, graph.params.picture_sigmas)
     right = np.zeros(len(dense.closures), bool)
-    row["methods"][CLEAN_LM] = judged(words, graph, PEERS["GTSAM LM"](dense, limit), right, clean)
-    graph, is_false, refused = filled(words, right_only=False, params=params)
+    row["methods"][CLEAN_LM] = judged(walk, graph, PEERS["GTSAM LM"](dense, limit), right, clean)
+    graph, is_false, refused = filled(walk, right_only=False, params=params)
     row |= {"closures": len(is_false), "false": int(is_false.sum()), "implausible": refused}
-    row["methods"][OURS] = judged(words, graph, solved(graph), is_false, clean)
+    row["methods"][OURS] = judged(walk, graph, solved(graph), is_false, clean)
     dense = Dense.of(graph, graph.params.picture_sigmas)
     for name in peers:
         try:
             answer = PEERS[name](dense, limit)
         except RuntimeError:  # GTSAM's, of a graph that it cannot solve
             answer = Solved(dense.poses, np.zeros(len(dense.closures), bool))
-        row["methods"][name] = judged(words, graph, answer, is_false, clean)
+        row["methods"][name] = judged(walk, graph, answer, is_false, clean)
     return row
 
 
-def judged(words: Walk, graph: PoseGraph, answer: Solved, is_false: Array, clean: float) -> dict[str, float]:
+def judged(walk: Walk, graph: PoseGraph, answer: Solved, is_false: Array, clean: float) -> dict[str, float]:
     """How an answer compares with the clean one."""
     return {
-        "ratio": error_of(words, graph, answer.poses) / clean,
+        "ratio": error_of(walk, graph, answer.poses) / clean,
         "false_kept": int((answer.kept & is_false).sum()),
         "right_pruned": int((~answer.kept & ~is_false).sum()),
     }
@@ -133,10 +133,10 @@ def table(rows: list[dict[str, Any]]) -> str:
         f"{'method':28} {'median':>8} {'p90':>8} {'p99':>9} {'> 1.3':>7} {'> 2':>7}"
         f" {'false kept':>11} {'right pruned':>13}",
     ]
-    for name, told in summary(rows).items():
-        shares = " ".join(f"{100 * told[f'above_{bound:g}']:>5.1f} %" for bound in TOO_MUCH)
+    for name, figures in summary(rows).items():
+        shares = " ".join(f"{100 * figures[f'above_{bound:g}']:>5.1f} %" for bound in TOO_MUCH)
         lines.append(
-            f"{name:28} {told['median']:>8.3f} {told['p90']:>8.3g} {told['p99']:>9.3g} {shares}"
-            f" {told['false_kept']:>11} {told['right_pruned']:>13}"
+            f"{name:28} {figures['median']:>8.3f} {figures['p90']:>8.3g} {figures['p99']:>9.3g} {shares}"
+            f" {figures['false_kept']:>11} {figures['right_pruned']:>13}"
         )
     return "\n".join(lines)

@@ -89,14 +89,14 @@ def _found(path: Path) -> Case:
         return Case(path.name, bare, source.truth, result.closures)
 
 
-Words = Callable[[Case, list[Frame]], list[LoopClosure]]
+ClosuresOf = Callable[[Case, list[Frame]], list[LoopClosure]]
 
 
 @dataclass(frozen=True)
 class Variant:
     """Closures made of those that were found, and parameters of the mapper."""
 
-    closures: Words
+    closures: ClosuresOf
     params: MapperParams = MapperParams()
 
 
@@ -107,17 +107,17 @@ def as_found(case: Case, _: list[Frame]) -> list[LoopClosure]:
 
 def perfect(case: Case, _: list[Frame]) -> list[LoopClosure]:
     """The same pairs with true poses."""
-    return [replace(word, T_from_to=T) for word, T in _with_truth(case)]
+    return [replace(closure, T_from_to=T) for closure, T in _with_truth(case)]
 
 
 def rotations_perfect(case: Case, _: list[Frame]) -> list[LoopClosure]:
     """The same pairs, their rotations true."""
-    return [replace(word, T_from_to=_mixed(T, word.T_from_to)) for word, T in _with_truth(case)]
+    return [replace(closure, T_from_to=_mixed(T, closure.T_from_to)) for closure, T in _with_truth(case)]
 
 
 def positions_perfect(case: Case, _: list[Frame]) -> list[LoopClosure]:
     """The same pairs, their positions true."""
-    return [replace(word, T_from_to=_mixed(word.T_from_to, T)) for word, T in _with_truth(case)]
+    return [replace(closure, T_from_to=_mixed(closure.T_from_to, T)) for closure, T in _with_truth(case)]
 
 
 def _mixed(rotation_of: Array, position_of: Array) -> Array:
@@ -127,53 +127,57 @@ def _mixed(rotation_of: Array, position_of: Array) -> Array:
 
 
 def _with_truth(case: Case) -> list[tuple[LoopClosure, Array]]:
-    pairs = [(word, case.truth.between(word.from_ns, word.to_ns)) for word in case.closures]
-    return [(word, T) for word, T in pairs if T is not None]
+    pairs = [(closure, case.truth.between(closure.from_ns, closure.to_ns)) for closure in case.closures]
+    return [(closure, T) for closure, T in pairs if T is not None]
 
 
 def true_ones(case: Case, _: list[Frame]) -> list[LoopClosure]:
     """Those within 5 degrees and 10 cm."""
-    errors = [(word, case.truth.error(word)) for word in case.closures]
-    return [word for word, error in errors if error is not None and within(error, LOOSE)]
+    errors = [(closure, case.truth.error(closure)) for closure in case.closures]
+    return [closure for closure, error in errors if error is not None and within(error, LOOSE)]
 
 
 def every_revisit(case: Case, frames: list[Frame]) -> list[LoopClosure]:
     """Perfect constraints for pairs of keyframes that there were to close, known to 5 mm and 0.2 degrees."""
-    words = []
+    closures = []
     revisits = closers.loops_of(closers.keyframes_of(frames), case.truth)
     for revisit in revisits[:: len(revisits) // MOST_REVISITS + 1]:
         T = case.truth.between(revisit.from_ns, revisit.to_ns)
         if T is not None:
-            words.append(closers.perfect(revisit.from_ns, revisit.to_ns, T))
-    return words
+            closures.append(closers.perfect(revisit.from_ns, revisit.to_ns, T))
+    return closures
 
 
-def scaled(factor: float) -> Words:
+def scaled(factor: float) -> ClosuresOf:
     """All covariances by a factor."""
-    return lambda case, _: [replace(word, covariance=factor * word.covariance) for word in case.closures]
+    return lambda case, _: [replace(closure, covariance=factor * closure.covariance) for closure in case.closures]
 
 
-def alike() -> Words:
+def alike() -> ClosuresOf:
     """All covariances the same: the middle one of position, and of rotation."""
 
     def made(case: Case, _: list[Frame]) -> list[LoopClosure]:
-        variances = np.median([np.diag(word.covariance) for word in case.closures], axis=0)
+        variances = np.median([np.diag(closure.covariance) for closure in case.closures], axis=0)
         C = np.diag(np.repeat([variances[:3].mean(), variances[3:].mean()], 3))
-        return [replace(word, covariance=C) for word in case.closures]
+        return [replace(closure, covariance=C) for closure in case.closures]
 
     return made
 
 
-def thinned(metres: float) -> Words:
+def thinned(metres: float) -> ClosuresOf:
     """Closures between the same two stretches of the way share what one of them knows; a radian counts as a metre."""
 
     def made(case: Case, frames: list[Frame]) -> list[LoopClosure]:
-        words, stamps, way = case.closures, np.array([frame.stamp_ns for frame in frames]), _way(frames)
+        closures, stamps, way = case.closures, np.array([frame.stamp_ns for frame in frames]), _way(frames)
         ends = [
-            tuple(int(np.interp(stamp, stamps, way) / metres) for stamp in (word.from_ns, word.to_ns)) for word in words
+            tuple(int(np.interp(stamp, stamps, way) / metres) for stamp in (closure.from_ns, closure.to_ns))
+            for closure in closures
         ]
         count = Counter(ends)
-        return [replace(word, covariance=count[end] * word.covariance) for word, end in zip(words, ends, strict=True)]
+        return [
+            replace(closure, covariance=count[end] * closure.covariance)
+            for closure, end in zip(closures, ends, strict=True)
+        ]
 
     return made
 
@@ -241,9 +245,9 @@ def filled(case: Case, frames: list[Frame], variant: Variant) -> tuple[PoseGraph
     for frame in frames:
         if frame.T_odom_camera is not None:
             graph.add_odometry(Odometry(T_odom_body=frame.T_odom_camera, stamp_ns=frame.stamp_ns))
-    for word in variant.closures(case, frames):
+    for closure in variant.closures(case, frames):
         try:
-            graph.add_closure(word)
+            graph.add_closure(closure)
         except ValueError:
             refused += 1
     return graph, refused
@@ -266,12 +270,14 @@ def consistency(case: Case) -> dict[str, Any]:
     independent ones, 1 where they all err alike.
     """
     rows = _with_truth(case)
-    errors = np.array([_error(word, T) for word, T in rows]).reshape(-1, 6)
-    white = np.array([e @ np.linalg.solve(word.covariance, e) / 6 for e, (word, _) in zip(errors, rows, strict=True)])
-    claimed = np.array([np.sqrt(np.diag(word.covariance)) for word, _ in rows]).reshape(-1, 6)
+    errors = np.array([_error(closure, T) for closure, T in rows]).reshape(-1, 6)
+    white = np.array(
+        [e @ np.linalg.solve(closure.covariance, e) / 6 for e, (closure, _) in zip(errors, rows, strict=True)]
+    )
+    claimed = np.array([np.sqrt(np.diag(closure.covariance)) for closure, _ in rows]).reshape(-1, 6)
     groups: dict[tuple[int, int], list[Array]] = {}
-    for e, (word, _) in zip(errors, rows, strict=True):
-        groups.setdefault((word.from_ns // 2_000_000_000, word.to_ns // 2_000_000_000), []).append(e[:3])
+    for e, (closure, _) in zip(errors, rows, strict=True):
+        groups.setdefault((closure.from_ns // 2_000_000_000, closure.to_ns // 2_000_000_000), []).append(e[:3])
     many = [np.array(group) for group in groups.values() if len(group) > 1]
     pairs = sum(len(g) * (len(g) - 1) for g in many)
     products = sum(float(np.square(g.sum(axis=0)).sum() - np.square(g).sum()) for g in many)
@@ -286,24 +292,25 @@ def consistency(case: Case) -> dict[str, Any]:
     }
 
 
-def _error(word: LoopClosure, T: Array) -> Array:
+def _error(closure: LoopClosure, T: Array) -> Array:
     """[t r] in the axes of *from*."""
-    turned = vector_from_rotation(word.T_from_to[:3, :3] @ T[:3, :3].T)
-    return np.concatenate([word.T_from_to[:3, 3] - T[:3, 3], turned])
+    turned = vector_from_rotation(closure.T_from_to[:3, :3] @ T[:3, :3].T)
+    return np.concatenate([closure.T_from_to[:3, 3] - T[:3, 3], turned])
 
 
-def table(name: str, told: dict[str, Any]) -> str:
+def table(name: str, figures: dict[str, Any]) -> str:
     """One recording as text: means over the drifts, and the ratio to perfect constraints, drift by drift."""
     lines = [
-        f"{name}: {told['closures']} closures that err {told['error_cm']:.2f} cm and {told['error_deg']:.2f} deg, and"
-        f" claim {told['claimed_cm']:.2f} cm and {told['claimed_deg']:.2f} deg; squared in variances"
-        f" {told['squared_in_variances']:.2f}; shared " + ("-" if told["shared"] is None else f"{told['shared']:.2f}"),
+        f"{name}: {figures['closures']} closures that err {figures['error_cm']:.2f} cm and {figures['error_deg']:.2f}"
+        f" deg, and claim {figures['claimed_cm']:.2f} cm and {figures['claimed_deg']:.2f} deg; squared in variances"
+        f" {figures['squared_in_variances']:.2f}; shared "
+        + ("-" if figures["shared"] is None else f"{figures['shared']:.2f}"),
         f"{'':38} {'mean cm':>8} {'least':>7} {'most':>7} {'/ perfect':>10} {'worst':>6} {'pruned':>7}",
     ]
-    base = np.array(told["cm"][PERFECT])
-    for variant, values in told["cm"].items():
+    base = np.array(figures["cm"][PERFECT])
+    for variant, values in figures["cm"].items():
         cm = np.array(values)
-        pruned = f"{np.mean(told['pruned'][variant]):.1f}" if variant in told["pruned"] else "-"
+        pruned = f"{np.mean(figures['pruned'][variant]):.1f}" if variant in figures["pruned"] else "-"
         lines.append(
             f"{variant:38} {cm.mean():>8.2f} {cm.min():>7.2f} {cm.max():>7.2f} {cm.mean() / base.mean():>10.2f}"
             f" {(cm / base).max():>6.2f} {pruned:>7}"

@@ -41,8 +41,8 @@ class Dense(NamedTuple):
 
     def between_pictures(self, offset: int) -> Dense:
         """The same with closures between other nodes, whose numbers are higher by an offset."""
-        words = self.closures
-        return self._replace(closures=Edges(words.k1 + offset, words.k2 + offset, words.T_1_2, words.whitening))
+        edges = self.closures
+        return self._replace(closures=Edges(edges.k1 + offset, edges.k2 + offset, edges.T_1_2, edges.whitening))
 
 
 class Solved(NamedTuple):

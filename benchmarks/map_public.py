@@ -93,11 +93,11 @@ def _steps(edges: Edges, count: int) -> Array:
 def compare(public: Public, robust: bool) -> dict[str, Any]:
     """Chi-squared of all edges, by every method, and how long it took."""
     dense, factors = public.dense, factors_of(public.dense)
-    told: dict[str, Any] = {"poses": len(dense.poses), "edges": len(dense.steps) + len(dense.closures)}
+    figures: dict[str, Any] = {"poses": len(dense.poses), "edges": len(dense.steps) + len(dense.closures)}
 
     def note(name: str, poses: Array, seconds: float, left_out: int = 0) -> None:
         chi2 = 2 * factors.error(values_of(poses))
-        told[name] = {"chi2": float(chi2), "seconds": seconds, "left_out": left_out}
+        figures[name] = {"chi2": float(chi2), "seconds": seconds, "left_out": left_out}
 
     note(START, dense.poses, 0.0)
     start = time.perf_counter()
@@ -108,8 +108,8 @@ def compare(public: Public, robust: bool) -> dict[str, Any]:
         start = time.perf_counter()
         graph = _doubted(public)
         note(ROBUST, graph.poses, time.perf_counter() - start, int((~graph.kept).sum()))
-        told[ROBUST]["truncated"] = graph.cost
-    return told
+        figures[ROBUST]["truncated"] = graph.cost
+    return figures
 
 
 def _believed(public: Public) -> Array:
@@ -159,13 +159,13 @@ def _along(poses: Array, steps: Edges) -> Array:
     return np.array(known[len(poses) :]).reshape(-1, 4, 4)
 
 
-def table(name: str, told: dict[str, Any]) -> str:
+def table(name: str, figures: dict[str, Any]) -> str:
     """One graph as text."""
-    head = f"{name}: {told['poses']} poses, {told['edges']} edges"
+    head = f"{name}: {figures['poses']} poses, {figures['edges']} edges"
     lines = [f"{head:44} {'chi2':>14} {'s':>8} {'left out':>9} {'truncated':>12}"]
     for method in (START, LM, BELIEVED, ROBUST):
-        if method in told:
-            one = told[method]
+        if method in figures:
+            one = figures[method]
             truncated = f"{one['truncated']:.1f}" if "truncated" in one else "-"
             lines.append(
                 f"{method:44} {one['chi2']:>14.5g} {one['seconds']:>8.2f} {one['left_out']:>9} {truncated:>12}"

@@ -20,7 +20,7 @@ from objreg_tools.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
 
 BUILDING = WalkParams(step_m=0.27, corridor_m=10.0, corridors=8, false_share=0.05, lie_m=(0.1, 30.0))
 SHORT_M = 250.0  # what Open3D's dense optimiser can do
-PARTS = 10  # of the walk that are told apart
+PARTS = 10  # of the walk that are reported apart
 
 
 def long_walk(poses: int, closures: int, seed: int) -> Walk:
@@ -28,15 +28,15 @@ def long_walk(poses: int, closures: int, seed: int) -> Walk:
     return walk(replace(BUILDING, poses=poses, closures=closures), seed)
 
 
-def ours(words: Walk) -> dict[str, Any]:
+def ours(walk: Walk) -> dict[str, Any]:
     """Odometry and closures in the order of time, with a solution after every closure."""
     graph, at = PoseGraph(), 0
     of_odometry, of_closures, of_processor = list[float](), list[float](), list[float]()
     parts, refused = list[dict[str, Any]](), 0
-    every = max(len(words.closures) // PARTS, 1)
-    for k, closure in enumerate(tqdm(words.closures, desc="closures"), 1):
+    every = max(len(walk.closures) // PARTS, 1)
+    for k, closure in enumerate(tqdm(walk.closures, desc="closures"), 1):
         until = closure.to_ns // PERIOD_NS + 1
-        of_odometry += [_seconds(graph.add_odometry, odometry) for odometry in words.odometry[at:until]]
+        of_odometry += [_seconds(graph.add_odometry, odometry) for odometry in walk.odometry[at:until]]
         at, start, begun = max(at, until), time.perf_counter(), time.process_time()
         try:
             graph.add_closure(closure)
@@ -45,14 +45,14 @@ def ours(words: Walk) -> dict[str, Any]:
         summary = graph.optimise()
         of_closures.append(time.perf_counter() - start)
         of_processor.append(time.process_time() - begun)
-        if k % every == 0 or k == len(words.closures):
-            kept = {(word.from_ns, word.to_ns) for word in summary.kept}
+        if k % every == 0 or k == len(walk.closures):
+            kept = {(one.from_ns, one.to_ns) for one in summary.kept}
             times = {
                 "odometry_ms": _percentiles(of_odometry, (50, 95)),
                 "closure_ms": _percentiles(of_closures, (50, 95, 100)),
                 "processor_ms": _percentiles(of_processor, (50, 95)),
             }
-            parts.append(_told(words, graph, kept, times, (k, refused)))
+            parts.append(_part(walk, graph, kept, times, (k, refused)))
             tqdm.write(row(parts[-1]))
             of_odometry, of_closures, of_processor = [], [], []
     return {"parts": parts, "keyframes": len(graph.keyframes)}
@@ -64,8 +64,8 @@ def _seconds(work: Callable[[Any], Any], given: Any) -> float:
     return time.perf_counter() - start
 
 
-def _told(
-    words: Walk,
+def _part(
+    walk: Walk,
     graph: PoseGraph,
     kept: set[tuple[int, int]],
     times: dict[str, list[float]],
@@ -73,7 +73,7 @@ def _told(
 ) -> dict[str, Any]:
     """One part of the walk: its times, and the map as it is after it."""
     closures, refused = counts
-    seen = list(zip(words.closures[:closures], words.is_false[:closures].tolist(), strict=True))
+    seen = list(zip(walk.closures[:closures], walk.is_false[:closures].tolist(), strict=True))
     return {
         "keyframes": len(graph.keyframes),
         "closures": closures,
@@ -81,9 +81,9 @@ def _told(
         **times,
         "memory_mb": memory_mb(),
         "false": sum(false for _, false in seen),
-        "false_kept": sum(false and (word.from_ns, word.to_ns) in kept for word, false in seen),
-        "right_pruned": sum(not false and (word.from_ns, word.to_ns) not in kept for word, false in seen),
-        "ate_m": error_of(words, graph, np.array([T for _, T in graph.path()])),
+        "false_kept": sum(false and (closure.from_ns, closure.to_ns) in kept for closure, false in seen),
+        "right_pruned": sum(not false and (closure.from_ns, closure.to_ns) not in kept for closure, false in seen),
+        "ate_m": error_of(walk, graph, np.array([T for _, T in graph.path()])),
     }
 
 
@@ -96,17 +96,17 @@ def _percentiles(seconds: list[float], shares: tuple[float, ...]) -> list[float]
     return [round(1e3 * float(value), 3) for value in np.percentile(seconds, shares)] if seconds else []
 
 
-def shortened(words: Walk, metres: float) -> Walk:
+def shortened(walk: Walk, metres: float) -> Walk:
     """The beginning of a walk."""
     count = int(metres / BUILDING.step_m)
-    inside = np.array([word.to_ns < count * PERIOD_NS for word in words.closures], bool)
-    closures = tuple(word for word, is_inside in zip(words.closures, inside.tolist(), strict=True) if is_inside)
-    return Walk(words.T_world_body[:count], words.odometry[:count], closures, words.is_false[inside])
+    inside = np.array([closure.to_ns < count * PERIOD_NS for closure in walk.closures], bool)
+    closures = tuple(closure for closure, is_inside in zip(walk.closures, inside.tolist(), strict=True) if is_inside)
+    return Walk(walk.T_world_body[:count], walk.odometry[:count], closures, walk.is_false[inside])
 
 
-def at_once(words: Walk, names: list[str], with_ours: bool = True) -> dict[str, Any]:
+def at_once(walk: Walk, names: list[str], with_ours: bool = True) -> dict[str, Any]:
     """Ours, without a solution before the last closure, and peers on the same graph."""
-    graph, is_false, _ = filled(words, right_only=False)
+    graph, is_false, _ = filled(walk, right_only=False)
     dense, figures = Dense.of(graph, graph.params.picture_sigmas), {}
     limit = graph.params.max_residual
     work: dict[str, Callable[[], Solved]] = {"objreg": lambda: solved(graph)} if with_ours else {}
@@ -115,13 +115,13 @@ def at_once(words: Walk, names: list[str], with_ours: bool = True) -> dict[str, 
         start = time.perf_counter()
         answer = work[name]()
         seconds = time.perf_counter() - start
-        figures[name] = _judged(words, graph, answer, is_false) | {"seconds": seconds, "memory_mb": memory_mb()}
+        figures[name] = _judged(walk, graph, answer, is_false) | {"seconds": seconds, "memory_mb": memory_mb()}
     return {"keyframes": len(dense.poses), "closures": len(is_false), "methods": figures}
 
 
-def _judged(words: Walk, graph: PoseGraph, answer: Solved, is_false: Array) -> dict[str, Any]:
+def _judged(walk: Walk, graph: PoseGraph, answer: Solved, is_false: Array) -> dict[str, Any]:
     return {
-        "ate_m": error_of(words, graph, answer.poses),
+        "ate_m": error_of(walk, graph, answer.poses),
         "false_kept": int((answer.kept & is_false).sum()),
         "right_pruned": int((~answer.kept & ~is_false).sum()),
     }
@@ -145,11 +145,11 @@ def row(part: dict[str, Any]) -> str:
     )
 
 
-def rows_at_once(told: dict[str, Any]) -> str:
+def rows_at_once(figures: dict[str, Any]) -> str:
     """What every method made of one graph."""
-    head = f"{told['keyframes']} keyframes and {told['closures']} closures at once"
+    head = f"{figures['keyframes']} keyframes and {figures['closures']} closures at once"
     lines = [f"{head:40} {'s':>8} {'MB so far':>9} {'false kept':>11} {'right pruned':>13} {'ATE m':>9}"]
-    for name, one in told["methods"].items():
+    for name, one in figures["methods"].items():
         counts = f"{one['false_kept']:>11} {one['right_pruned']:>13}"
         lines.append(f"{name:40} {one['seconds']:>8.1f} {one['memory_mb']:>9.0f} {counts} {one['ate_m']:>9.3f}")
     return "\n".join(lines)

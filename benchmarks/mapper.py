@@ -19,8 +19,8 @@ odometry drifts anew from its truth. Beside our closures those of the same pairs
 covariances, and with parts of the mapper, or of the closures, switched off or made perfect.
 
 ``landmarks``: whether objects help as landmarks. By plain Levenberg-Marquardt, with an error of each keyframe that all
-its closures and sightings share: closures alone, and beside them ranges and bearings of objects, which are told apart
-by place, by closures, by both as the registrar does, or by truth.
+its closures and sightings share: closures alone, and beside them ranges and bearings of objects, which are named by
+place, by closures, by both as the registrar does, or by truth.
 
 ``public``: pose graphs as g2o text. Chi-squared before and after, beside GTSAM's Levenberg-Marquardt.
 """
@@ -54,10 +54,10 @@ def main() -> None:
     """The subcommands say it."""
 
 
-def write(file: Path | None, told: Any) -> None:
+def write(file: Path | None, figures: Any) -> None:
     """Figures as JSON, if asked for."""
     if file is not None:
-        file.write_text(json.dumps(told, indent=1))
+        file.write_text(json.dumps(figures, indent=1))
 
 
 def _peers(context: click.Context, parameter: click.Parameter, value: str) -> list[str]:
@@ -94,15 +94,15 @@ def robust(graphs: int, seed: int, peers: list[str], pairwise: bool, json_file: 
 @JSON
 def scale(poses: int, closures: int, seed: int, json_file: Path | None) -> None:
     """A walk of kilometres."""
-    words = map_scale.long_walk(poses, closures, seed)
+    walk = map_scale.long_walk(poses, closures, seed)
     click.echo(map_scale.HEAD)
-    told = map_scale.ours(words)
-    write(json_file, told)
-    told["short"] = map_scale.at_once(map_scale.shortened(words, map_scale.SHORT_M), list(PEERS))
-    click.echo(map_scale.rows_at_once(told["short"]))
-    told["whole"] = map_scale.at_once(words, ["GTSAM LM"], with_ours=False)
-    click.echo(map_scale.rows_at_once(told["whole"]))
-    write(json_file, told)
+    figures = map_scale.ours(walk)
+    write(json_file, figures)
+    figures["short"] = map_scale.at_once(map_scale.shortened(walk, map_scale.SHORT_M), list(PEERS))
+    click.echo(map_scale.rows_at_once(figures["short"]))
+    figures["whole"] = map_scale.at_once(walk, ["GTSAM LM"], with_ours=False)
+    click.echo(map_scale.rows_at_once(figures["whole"]))
+    write(json_file, figures)
 
 
 def _compared(command: Callable[..., None]) -> Callable[..., None]:
@@ -131,24 +131,24 @@ def _cases(recordings: tuple[Path, ...], scenarios: tuple[str, ...], frames: int
 @_compared
 def limits(drifts: int, keep: Path, json_file: Path | None, **asked: Any) -> None:
     """What limits the trajectory."""
-    told = {}
+    figures = {}
     for path in _cases(keep=keep, **asked):
         case = map_limits.found(path, keep)
-        told[case.name] = map_limits.limits(case, drifts)
-        click.echo(map_limits.table(case.name, told[case.name]) + "\n")
-        write(json_file, told)
+        figures[case.name] = map_limits.limits(case, drifts)
+        click.echo(map_limits.table(case.name, figures[case.name]) + "\n")
+        write(json_file, figures)
 
 
 @main.command()
 @_compared
 def landmarks(drifts: int, keep: Path, json_file: Path | None, **asked: Any) -> None:
     """Whether objects help as landmarks."""
-    told = {}
+    figures = {}
     for path in _cases(keep=keep, **asked):
         case = map_limits.found(path, keep)
-        told[case.name] = map_landmarks.compare(case, map_landmarks.seen(path, keep), drifts)
-        click.echo(map_landmarks.table(case.name, told[case.name]) + "\n")
-        write(json_file, told)
+        figures[case.name] = map_landmarks.compare(case, map_landmarks.seen(path, keep), drifts)
+        click.echo(map_landmarks.table(case.name, figures[case.name]) + "\n")
+        write(json_file, figures)
 
 
 @main.command()
@@ -157,15 +157,15 @@ def landmarks(drifts: int, keep: Path, json_file: Path | None, **asked: Any) -> 
 @JSON
 def public(files: tuple[Path, ...], is_robust: bool, json_file: Path | None) -> None:
     """Pose graphs that others publish, as g2o text."""
-    told = {}
+    figures = {}
     for file in files:
         try:
             graph = map_public.read(file)
         except (ValueError, RuntimeError) as error:
             raise click.BadParameter(str(error), param_hint="FILES") from error
-        told[graph.name] = map_public.compare(graph, is_robust)
-        click.echo(map_public.table(graph.name, told[graph.name]) + "\n")
-        write(json_file, told)
+        figures[graph.name] = map_public.compare(graph, is_robust)
+        click.echo(map_public.table(graph.name, figures[graph.name]) + "\n")
+        write(json_file, figures)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ import click
 import numpy as np
 from command_line import quick_values
 from sources import TRUE_BOXES, Reading, detector_of, read_source
-from tables import table_story
+from tables import table_plan
 from tqdm import tqdm
 
 from objreg_ros.bridge.process.lifetime import share_arenas
@@ -50,7 +50,7 @@ def passes(tables: int, folder: Path) -> list[list[Frame]]:
     found = []
     for seed in range(tables):
         path = folder / f"table_{seed}"
-        write_plan(path, table_story(OBJECTS, FRAMES, seed), "table", seed, jpeg=True, threads=os.cpu_count() or 1)
+        write_plan(path, table_plan(OBJECTS, FRAMES, seed), "table", seed, jpeg=True, threads=os.cpu_count() or 1)
         with read_source(path, detector_of(TRUE_BOXES), seed, reading=Reading(every=EVERY)) as source:
             found.append(source.frames)
     return found

@@ -27,7 +27,7 @@ INTS = (
     -(2**31), -1, 0, 1, 2, 3, 4, 7, 8, 16, 127, 128, 255, 256, 30_000, 32_767, 32_768, 65_534, 65_535, 65_536, 70_000,
     1_000_000, 999_999_999, 10**9, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1,
 )  # fmt: skip
-WORDS = (
+STRINGS = (
     "", " ", "x", "z", "rgb", "rgba", "intensity", "camera", "camera@", "@1.000000000", "a@b@1.000000000", "\0", "\n",
     "é" * 40, "\U0001f4a5", "x" * 100_000, "rgb8", "bgr8", "rgba8", "mono8", "mono16", "8UC1", "8UC3", "8UC4", "16UC1",
     "32FC1", "64FC1", "8UC1000000", "bayer_rggb8", "yuv422", "jpeg", "png", "rgb8; jpeg compressed bgr8",
@@ -110,7 +110,7 @@ def _other(draw: random.Random, value: Any, kind: str) -> Any:
     if kind in RANGES:
         return other_int(draw, *RANGES[kind])
     if kind.startswith("string"):
-        return draw.choice(WORDS)
+        return draw.choice(STRINGS)
     _mutate_field(draw, value)
     return value
 
@@ -228,7 +228,7 @@ def _field(draw: random.Random, cloud: Any) -> None:
             ("count", draw.choice((0, 2, 3, 4, 1000, 2**31, 2**32 - 1))),
             ("datatype", draw.randrange(10)),
             ("offset", draw.choice((0, 1, 2, 3, cloud.point_step, 2**31, 2**32 - 1))),
-            ("name", draw.choice((*WORDS[:6], draw.choice(cloud.fields).name))),
+            ("name", draw.choice((*STRINGS[:6], draw.choice(cloud.fields).name))),
         )
     )
     setattr(field, name, value)
@@ -268,12 +268,12 @@ def _huge_camera(draw: random.Random, info: Any) -> None:
 
 
 def _encoding(draw: random.Random, picture: Any) -> None:
-    picture.encoding = draw.choice(WORDS)
+    picture.encoding = draw.choice(STRINGS)
     picture.is_bigendian = draw.choice((0, 1, 255))
 
 
 def _format(draw: random.Random, picture: Any) -> None:
-    picture.format = draw.choice(WORDS)
+    picture.format = draw.choice(STRINGS)
 
 
 def _claimed_size(draw: random.Random, picture: Any) -> None:

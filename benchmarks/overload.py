@@ -2,7 +2,7 @@
 """The live graph on too few cores, at several times the camera's speed: memory, constraints, and how it ends.
 
 A simulated recording is played over and over, with stamps that go on, to three nodes that share ``--cores`` cores. Each
-second the memory of every node is read, and what the registrar tells of itself. At the end it gets a SIGINT while it
+second the memory of every node is read, and what the registrar reports of itself. At the end it gets a SIGINT while it
 is still overloaded. What it must show: its memory does not grow after a warm-up of a third of the time, constraints
 keep coming, the newest keyframe's search begins within 2 s (p95), and the process ends within 5 s with everything
 stored.
@@ -43,11 +43,11 @@ from objreg_tools.recording.replay import graph_names
 WARM_UP = 1 / 3  # of the time: memory that is taken then is not counted as growth
 END_S = 120.0  # a node that has not ended by then is killed
 ROWS = 12  # of the table
-TOLD = ("stored keyframes", "stored unsearched", "waiting keyframes", "constraints", "received", "published")
+REPORTED = ("stored keyframes", "stored unsearched", "waiting keyframes", "constraints", "received", "published")
 
 
 class Gauge:
-    """Receives what the nodes tell of themselves on /diagnostics, in a thread of its own."""
+    """Receives what the nodes report of themselves on /diagnostics, in a thread of its own."""
 
     def __init__(self) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
@@ -57,8 +57,8 @@ class Gauge:
 
         from objreg_ros.bridge.node import qos
 
-        self.told: dict[str, dict[str, str]] = {}  # node → what it told last
-        self.rows: list[tuple[float, dict[str, str]]] = []  # when, and what the registrar told
+        self.latest: dict[str, dict[str, str]] = {}  # node → what it reported last
+        self.rows: list[tuple[float, dict[str, str]]] = []  # when, and what the registrar reported
         self._context = Context()
         self._context.init(args=[])
         node = Node("gauge", context=self._context)
@@ -72,9 +72,9 @@ class Gauge:
         for status in message.status:
             name, _, what = status.name.strip("/").partition(": ")
             if what == "frames":
-                self.told[name] = {pair.key: pair.value for pair in status.values}
+                self.latest[name] = {pair.key: pair.value for pair in status.values}
                 if name == "registrar":
-                    self.rows.append((time.monotonic(), self.told[name]))
+                    self.rows.append((time.monotonic(), self.latest[name]))
 
     def close(self) -> None:
         """End it."""
@@ -162,16 +162,16 @@ def measure(path: Path, seconds: float, speed: float, cores: int, keyframes: int
     with Processes(folder, environment) as processes:
         meter, gauge = Meter(), Gauge()
         with on_cores(cores):
-            for room in STAGES:
+            for stage in STAGES:
                 kept = ("-p", f"store:={store}", "-p", f"max_keyframes:={keyframes}")
-                more = ["--ros-args", *kept] if room == "registrar" else []
-                node = processes.start(room, f"objreg_ros.{room}.node", more)
+                more = ["--ros-args", *kept] if stage == "registrar" else []
+                node = processes.start(stage, f"objreg_ros.{stage}.node", more)
         _wait_for_nodes(gauge, processes)
         start = time.monotonic()
         play(path, seconds, speed)
-        stop, last = time.monotonic(), dict(gauge.told.get("registrar", {}))
+        stop, last = time.monotonic(), dict(gauge.latest.get("registrar", {}))
         processes.require_alive()
-        books = {room: unaccounted(gauge.told[room]) for room in STAGES}
+        missing = {stage: unaccounted(gauge.latest[stage]) for stage in STAGES}
         ended = seconds_to_end(node)
         gauge.close()
         usage = meter.figures(start, stop)
@@ -184,26 +184,28 @@ def measure(path: Path, seconds: float, speed: float, cores: int, keyframes: int
         "registrar": last,
         "stored_in_file": stored,
         "seconds_from_sigint": ended,
-        "unaccounted": books,
+        "unaccounted": missing,
         "usage": usage,
-        "slope_mb_per_hour": {room: slope_mb_per_hour(meter.samples[room], warm) for room in STAGES},
-        "memory_mb": {room: [(at - start, mb) for at, _, mb, _ in meter.samples[room]] for room in STAGES},
-        "rows": [{"at": at - start, **{key: told.get(key) for key in TOLD}} for at, told in gauge.rows if at >= start],
+        "slope_mb_per_hour": {stage: slope_mb_per_hour(meter.samples[stage], warm) for stage in STAGES},
+        "memory_mb": {stage: [(at - start, mb) for at, _, mb, _ in meter.samples[stage]] for stage in STAGES},
+        "rows": [
+            {"at": at - start, **{key: values.get(key) for key in REPORTED}} for at, values in gauge.rows if at >= start
+        ],
     }
 
 
-def unaccounted(told: Mapping[str, str]) -> int:
-    """The frames of a node that its books do not tell the end of: 0 where they balance."""
-    dropped = sum(int(count) for key, count in told.items() if key.startswith("dropped: "))
-    return int(told["received"]) - int(told["published"]) - int(told["waiting"]) - dropped
+def unaccounted(values: Mapping[str, str]) -> int:
+    """The frames of a node whose end its counters do not say: 0 where they balance."""
+    dropped = sum(int(count) for key, count in values.items() if key.startswith("dropped: "))
+    return int(values["received"]) - int(values["published"]) - int(values["waiting"]) - dropped
 
 
 def _wait_for_nodes(gauge: Gauge, processes: Processes) -> None:
     deadline = time.monotonic() + START_S
-    while not set(STAGES) <= gauge.told.keys():
+    while not set(STAGES) <= gauge.latest.keys():
         processes.require_alive()
         if time.monotonic() > deadline:
-            raise click.ClickException(f"expected {', '.join(STAGES)} to report, got {sorted(gauge.told)}")
+            raise click.ClickException(f"expected {', '.join(STAGES)} to report, got {sorted(gauge.latest)}")
         time.sleep(0.2)
 
 
@@ -214,9 +216,9 @@ def table_of(figures: Mapping[str, Any]) -> str:
     rows = figures["rows"]
     for row in rows[:: max(len(rows) // ROWS, 1)]:
         mb = float(np.interp(row["at"], at, memory))
-        told = [row[key] for key in ("stored keyframes", "stored unsearched", "waiting keyframes", "constraints")]
-        lines.append("{:5.0f}  {:12.1f}  {:>9}  {:>10}  {:>7}  {:>11}".format(row["at"], mb, *map(str, told)))
-    slopes = ", ".join(f"{room} {slope:+.1f}" for room, slope in figures["slope_mb_per_hour"].items())
+        counts = [row[key] for key in ("stored keyframes", "stored unsearched", "waiting keyframes", "constraints")]
+        lines.append("{:5.0f}  {:12.1f}  {:>9}  {:>10}  {:>7}  {:>11}".format(row["at"], mb, *map(str, counts)))
+    slopes = ", ".join(f"{stage} {slope:+.1f}" for stage, slope in figures["slope_mb_per_hour"].items())
     last, ended = figures["registrar"], figures["seconds_from_sigint"]
     age = [last.get(f"latency wait {share} [ms]") for share in ("p50", "p95")]
     return "\n".join(
@@ -224,7 +226,7 @@ def table_of(figures: Mapping[str, Any]) -> str:
             *lines,
             f"growth of memory after the warm-up, MB/h: {slopes}",
             f"age of the newest keyframe when its search begins, p50 and p95 [ms]: {age[0]} {age[1]}",
-            f"frames that the books do not account for: {figures['unaccounted']}",
+            f"frames that the counters do not account for: {figures['unaccounted']}",
             f"stored in the file {figures['stored_in_file']}",
             f"seconds from SIGINT to the end: {'killed' if ended is None else f'{ended:.1f}'}",
         )
@@ -252,7 +254,7 @@ def main(
     recording: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Overload the live graph, and tell how it bears that."""
+    """Overload the live graph, and report how it bears that."""
     with tempfile.TemporaryDirectory() as folder:
         if recording is not None:
             figures = measure(recording, seconds, speed, cores, keyframes, Path(folder))

@@ -175,7 +175,7 @@ def methods_of(
 
 
 def lagged_poses(truth: Truth, keyframes: Sequence[Keyframe], lag_ms: int) -> list[Array]:
-    """The true poses of what was seen ``lag_ms`` before the stamps; at the stamps where the truth tells no others."""
+    """The true poses of what was seen ``lag_ms`` before the stamps; at the stamps where the truth has no others."""
     found = []
     for keyframe in keyframes:
         T = truth.at(keyframe.stamp_ns - 1_000_000 * lag_ms)

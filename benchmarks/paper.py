@@ -304,11 +304,11 @@ def line_graph(sweep: dict[str, list[dict[str, Any]]], file: Path) -> None:
     for column, (label, cells) in enumerate(sweep.items()):
         angles = [cell["angles_deg"][0] for cell in cells]
         top, bottom = axes[:, column]
-        told = [(a, cell["document_m"]) for a, cell in zip(angles, cells, strict=True) if cell["document_m"]]
-        top.semilogy(*zip(*told, strict=True), "o--", color="#8b8a83", markersize=3, label="the document")
-        for name, (colour, words) in styles.items():
-            top.semilogy(angles, [cell[name]["error_m"] for cell in cells], "o-", color=colour, ms=3, label=words)
-            bottom.plot(angles, [cell[name]["rotation_deg"] for cell in cells], "o-", color=colour, ms=3, label=words)
+        stated = [(a, cell["document_m"]) for a, cell in zip(angles, cells, strict=True) if cell["document_m"]]
+        top.semilogy(*zip(*stated, strict=True), "o--", color="#8b8a83", markersize=3, label="the document")
+        for name, (colour, title) in styles.items():
+            top.semilogy(angles, [cell[name]["error_m"] for cell in cells], "o-", color=colour, ms=3, label=title)
+            bottom.plot(angles, [cell[name]["rotation_deg"] for cell in cells], "o-", color=colour, ms=3, label=title)
         top.set_title(label.replace("_", " "))
         bottom.set_xlabel("change of view about X, °")
         bottom.set_xticks(range(-180, 181, 90))
@@ -321,15 +321,15 @@ def line_graph(sweep: dict[str, list[dict[str, Any]]], file: Path) -> None:
 
 def show(cell: dict[str, Any]) -> str:
     """One cell as a line."""
-    words = f"{cell['object']:11} {cell['angles_deg'][0]:5.0f}°"
-    words += "        " if cell["document_m"] is None else f"  {cell['document_m']:.5f} m"
+    line = f"{cell['object']:11} {cell['angles_deg'][0]:5.0f}°"
+    line += "        " if cell["document_m"] is None else f"  {cell['document_m']:.5f} m"
     for name in METHODS:
         m = cell[name]
         none = m["error_m"] is None
-        words += f"  {name}: " + ("none" if none else f"{m['error_m']:.4f} m {m['rotation_deg']:5.1f}° "
+        line += f"  {name}: " + ("none" if none else f"{m['error_m']:.4f} m {m['rotation_deg']:5.1f}° "
                                   f"{m['translation_cm']:5.1f} cm {100 * m['success']:3.0f} %")  # fmt: skip
-        words += f", accepted {100 * m['accepted']:.0f} %" if "accepted" in m else ""
-    return words
+        line += f", accepted {100 * m['accepted']:.0f} %" if "accepted" in m else ""
+    return line
 
 
 @click.command()

@@ -63,7 +63,7 @@ STORED = (0.0, 60.0, 120.0, 180.0)  # sides that an object is known from
 QUICK_SECONDS, LEAST = 40.0, 3  # after which a quick run begins no piece beyond the least
 STAGES = 5  # strangers of each kind that are shown to each other
 SYMMETRIC = ("soda_can", "bowl")
-TELLING = ("cereal_box", "chair", "monitor", "flashlight", "book", "keyboard")  # a cap tells next to nothing
+ASYMMETRIC = ("cereal_box", "chair", "monitor", "flashlight", "book", "keyboard")  # a cap shows next to nothing
 
 
 class Bench:
@@ -211,7 +211,7 @@ class Bench:
             "recall_accepted_joint": mean([row for row in closable if "label" not in row], "accepted"),
             "refused_though_right": dict(Counter(row["why"] for row in closable if not row["accepted"])),
             "symmetry_recall": mean([row for row in rows if row["label"] in SYMMETRIC], "yaw_unknown"),
-            "symmetry_false_alarm": mean([row for row in rows if row["label"] in TELLING], "yaw_unknown"),
+            "symmetry_false_alarm": mean([row for row in rows if row["label"] in ASYMMETRIC], "yaw_unknown"),
             "false": [
                 {key: row.get(key, "four") for key in ("label", "angle", "pose_error")} for row in both if row["false"]
             ]

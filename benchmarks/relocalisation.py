@@ -3,7 +3,7 @@
 
 The first half of a recording is the earlier session. The later sessions begin at several moments of its second half,
 each beside a copy of the store, in odometry that begins anew at the camera. A known object is seen once one that the
-earlier session stored is (by label and true place, within 30 cm). Told is the share of starts that saw one for five
+earlier session stored is (by label and true place, within 30 cm). Counted is the share of starts that saw one for five
 seconds and were relocated by then, the time that it took, and false starts: a first answer that is worse than 8 degrees
 or 15 cm (FALSE) in the earlier session's odometry, as that was at the keyframe that the answer is by. For where
 that session passed a place twice, its drift gives the place two positions in its map. Later answers are judged alike
@@ -130,12 +130,12 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def line(name: str, told: dict[str, Any]) -> str:
+def line(name: str, figures: dict[str, Any]) -> str:
     """A row of the table."""
-    share = f"{told['in_time']}/{told['could']} = {told['share']:.3f}"
-    median = "-" if told["median_s"] is None else f"{told['median_s']:.2f}"
-    counts = f"{told['false_sessions']:>6} {told['answers']:>8} {told['drifted']:>8}"
-    return f"{name:28} {told['sessions']:>8} {share:>16} {median:>9} {counts}"
+    share = f"{figures['in_time']}/{figures['could']} = {figures['share']:.3f}"
+    median = "-" if figures["median_s"] is None else f"{figures['median_s']:.2f}"
+    counts = f"{figures['false_sessions']:>6} {figures['answers']:>8} {figures['drifted']:>8}"
+    return f"{name:28} {figures['sessions']:>8} {share:>16} {median:>9} {counts}"
 
 
 HEAD = f"{'recording':28} {'sessions':>8} {'within 5 s':>16} {'median s':>9} {'false':>6} {'answers':>8} {'drifted':>8}"

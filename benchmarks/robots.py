@@ -7,7 +7,7 @@
 A FOLDER holds a recording for each robot, as `objreg simulate --scenario robots` writes them. ``one registrar`` takes
 all frames by their stamps; ``packed`` takes the keyframes that each robot made, packed to be sent and unpacked; of
 ``each its own`` every robot has a registrar, which asks for what the summaries of others promise (``--kilobytes`` a
-second; ``kB_per_s`` is what it sent from its first frame to the last of all). Meetings are as `fleet` tells them.
+second; ``kB_per_s`` is what it sent from its first frame to the last of all). Meetings are as `fleet` finds them.
 ``map_cm`` is the error of one map of all robots (aligned once), of the map with the same closures and perfect ties
 between robots, and of odometry; ``alone_cm`` that of each robot's own map.
 """
@@ -131,7 +131,7 @@ class Peers:
         self.closures = list[LoopClosure]()
         self.sizes = list[int]()  # of summaries
 
-    def tell(self, name: str, outcome: Outcome, now: float) -> None:
+    def publish(self, name: str, outcome: Outcome, now: float) -> None:
         """What a robot's search came to, and its summary to all others."""
         self.closures += outcome.closures
         summary = self.exchanges[name].announce(outcome)
@@ -158,10 +158,10 @@ def each_its_own(team: Team, kilobytes: float) -> tuple[list[LoopClosure], dict[
     peers, now = Peers(team, 1e3 * kilobytes if kilobytes else np.inf), 0.0
     for frame in tqdm(list(in_order(team)), desc="each its own"):
         now = 1e-9 * frame.stamp_ns
-        peers.tell(frame.robot, peers.registrars[frame.robot].process(frame), now)
+        peers.publish(frame.robot, peers.registrars[frame.robot].process(frame), now)
         peers.answer(now)
     for name, registrar in peers.registrars.items():
-        peers.tell(name, registrar.finish(), now)
+        peers.publish(name, registrar.finish(), now)
     peers.answer(now)
     for registrar in peers.registrars.values():
         peers.closures += registrar.settle().closures
@@ -172,7 +172,7 @@ def each_its_own(team: Team, kilobytes: float) -> tuple[list[LoopClosure], dict[
             name: 1e-3 * exchange.counters["bytes sent"] / (now - 1e-9 * team[name].frames[0].stamp_ns)
             for name, exchange in peers.exchanges.items()
         },
-        "books": {name: dict(sorted(exchange.counters.items())) for name, exchange in peers.exchanges.items()},
+        "counters": {name: dict(sorted(exchange.counters.items())) for name, exchange in peers.exchanges.items()},
         "waiting": {name: exchange.waiting for name, exchange in peers.exchanges.items()},
     }
 

@@ -260,15 +260,15 @@ def main(
 ) -> None:
     """Measure and print."""
     options |= quick_values(context, quick, QUICK if recordings else QUICK | {"scenarios": ("loop:61000",)})
-    told = plans(options["scenarios"])
-    if not recordings and not told:
+    simulations = plans(options["scenarios"])
+    if not recordings and not simulations:
         raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     cv2.setNumThreads(1)
     keep.mkdir(parents=True, exist_ok=True)
     detector = detector_of(options["model"], options["threshold"])
     store = store_of_rooms(keep, options["rooms"], detector)
     paths = [partial(Path, path) for path in recordings]
-    paths += [partial(simulated, keep, *plan, options["frames"]) for plan in told]
+    paths += [partial(simulated, keep, *plan, options["frames"]) for plan in simulations]
     rows: dict[str, dict[str, Any]] = {}
     click.echo(HEAD)
     for make in paths:

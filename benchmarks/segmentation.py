@@ -28,7 +28,7 @@ from typing import Any
 import click
 import cv2
 import numpy as np
-from labelled_images import LabelledImage, Thing, detections, jittered, labelled_clouds, simulated_images
+from labelled_images import LabelledImage, LabelledObject, detections, jittered, labelled_clouds, simulated_images
 
 from objreg_ros.data.checked import Array
 from objreg_ros.data.frames import ObjectCloud
@@ -71,25 +71,27 @@ def pixels_of(cloud: ObjectCloud | None, labelled: LabelledImage) -> Array:
 
 def judge(labelled: LabelledImage, source: str, method: str, segmenter: Segmenter, rng: Any) -> Iterable[Result]:
     """Every object of an image by one method."""
-    boxes = [jittered(thing.xyxy, *JITTER[source], rng) for thing in labelled.things]
+    boxes = [jittered(target.xyxy, *JITTER[source], rng) for target in labelled.objects]
     asked = detections(boxes, [str(k) for k in range(len(boxes))], labelled.image)
     clouds = {cloud.label: cloud for cloud in segmenter.segment(asked, labelled.image).objects}
-    for k, (thing, box) in enumerate(
-        zip(labelled.things, pixel_boxes(asked, *labelled.image.depth.shape), strict=True)
+    for k, (target, box) in enumerate(
+        zip(labelled.objects, pixel_boxes(asked, *labelled.image.depth.shape), strict=True)
     ):
         got = pixels_of(clouds.get(str(k)), labelled)
-        iou = float((got & thing.mask).sum() / max(1, (got | thing.mask).sum()))
+        iou = float((got & target.mask).sum() / max(1, (got | target.mask).sum()))
         x0, y0, x1, y1 = box
-        limit = float(thing.mask[y0:y1, x0:x1].sum() / thing.mask.sum())
-        tile = draw(labelled, thing, got, box, f"{iou:.2f} {thing.label} {labelled.name}") if method == OURS else None
-        yield Result(source, method, thing.label, iou, limit, tile)
+        limit = float(target.mask[y0:y1, x0:x1].sum() / target.mask.sum())
+        tile = draw(labelled, target, got, box, f"{iou:.2f} {target.label} {labelled.name}") if method == OURS else None
+        yield Result(source, method, target.label, iou, limit, tile)
 
 
-def draw(labelled: LabelledImage, thing: Thing, got: Array, box: tuple[int, int, int, int], title: str) -> Array:
+def draw(
+    labelled: LabelledImage, target: LabelledObject, got: Array, box: tuple[int, int, int, int], title: str
+) -> Array:
     """A picture of one result: right green, too much red, missed blue."""
     assert labelled.image.rgb is not None
     picture = labelled.image.rgb.copy()
-    for mask, colour in ((got & thing.mask, RIGHT), (got & ~thing.mask, TOO_MUCH), (thing.mask & ~got, MISSED)):
+    for mask, colour in ((got & target.mask, RIGHT), (got & ~target.mask, TOO_MUCH), (target.mask & ~got, MISSED)):
         picture[mask] = picture[mask] // 2 + np.array(colour, np.uint8)
     x0, y0, x1, y1 = box
     cv2.rectangle(picture, (x0, y0), (x1, y1), (255, 255, 0), 1)
@@ -131,7 +133,7 @@ def timings(images: list[LabelledImage], repeats: int, rng: Any) -> dict[str, fl
     """Milliseconds a frame of four boxes, and Open3D's time over ours."""
     wall, cpu, ratios = [], [], []
     for labelled in images:
-        four = [jittered(labelled.things[k % len(labelled.things)].xyxy, 0.0, 0.1, rng) for k in range(BOXES)]
+        four = [jittered(labelled.objects[k % len(labelled.objects)].xyxy, 0.0, 0.1, rng) for k in range(BOXES)]
         asked = detections(four, ["object"] * BOXES, labelled.image)
         boxes, segmenter = pixel_boxes(asked, *labelled.image.depth.shape), Segmenter()
         stream = [replace(labelled.image, stamp_ns=k * PERIOD_NS) for k in range(FIRST + repeats)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the stream itself tells of its sensor, beside the simulated truth.
+"""What the stream itself shows of its sensor, beside the simulated truth.
 
     python benchmarks/sensor.py --json OUT --picture sensor.png
 
@@ -59,7 +59,7 @@ def frames_of(sensor: str, rig: RigParams, seed: int, count: int, rate: float) -
 
 
 def measured(sensor: str, rig: RigParams, seed: int, count: int, rate: float) -> dict[str, Any]:
-    """What one stream tells, and the truth, frame by frame."""
+    """What one stream shows, and the truth, frame by frame."""
     stream, found, true, noise = DepthToColour(), [], [], []  # what would be found of a stereo camera is not used
     estimate = SensorEstimate()
     for image, rotation in frames_of(sensor, rig, seed, count, rate):
@@ -74,7 +74,7 @@ def measured(sensor: str, rig: RigParams, seed: int, count: int, rate: float) ->
         "off_deg": np.percentile(off, (50, 90)).tolist(),
         "true_deg": np.percentile(np.linalg.norm(degrees["true"], axis=1), (50, 90)).tolist(),
         "noise": np.percentile(noise, (10, 50, 90)).tolist(),
-        "told_noise": estimate.noise,
+        "estimated_noise": estimate.noise,
         "true_lag_ms": rig.lag_ms,
         "lag": None if estimate.lag is None else estimate.lag._asdict(),
         **{name: value.tolist() for name, value in degrees.items()},
@@ -110,15 +110,17 @@ def draw(rows: dict[str, dict[str, Any]], path: Path) -> None:
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--picture", type=click.Path(dir_okay=False, path_type=Path), help="Draw found over true offsets here.")
 def main(frames: int, rate: float, seed: int, json_file: Path | None, picture: Path | None) -> None:
-    """Compare what streams tell of their sensor with the truth."""
+    """Compare what streams show of their sensor with the truth."""
     streams = [(f"{sensor}, {name}", sensor, rig) for sensor in SENSORS for name, rig in RIGS.items()]
     rows = {name: measured(sensor, rig, seed, frames, rate) for name, sensor, rig in tqdm(streams, unit="stream")}
-    click.echo(f"{'stream':40} {'true offset':>16} {'found, off by':>16}   noise (median, 10 and 90 %)  true lag  told")
+    click.echo(
+        f"{'stream':40} {'true offset':>16} {'found, off by':>16}   noise (median, 10 and 90 %)  true lag  found"
+    )
     for name, row in rows.items():
         (true, true_90), (off, off_90), (low, noise, high) = row["true_deg"], row["off_deg"], row["noise"]
         offsets = f"{true:6.2f} (p90 {true_90:.2f}) {off:6.2f} (p90 {off_90:.2f})"
-        told = "-" if row["lag"] is None else f"{row['lag']['ms']:.0f} +- {row['lag']['sigma_ms']:.0f} ms"
-        lags = f"{row['true_lag_ms']:.0f} ms  {told}"
+        found = "-" if row["lag"] is None else f"{row['lag']['ms']:.0f} +- {row['lag']['sigma_ms']:.0f} ms"
+        lags = f"{row['true_lag_ms']:.0f} ms  {found}"
         click.echo(f"{name:40} {offsets}   {noise:.2f} ({low:.2f}, {high:.2f})  {lags}")
     if json_file is not None:
         json_file.write_text(json.dumps(rows))

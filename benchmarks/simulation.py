@@ -41,7 +41,7 @@ from objreg_tools.simulation.write import simulate
 SHAPE = (KINECT.height, KINECT.width)
 BUILT = RigParams(distortion=LENSES["webcam"], lag_ms=30.0, rolling_ms=25.0, blur_ms=12.0, misregistration_px=4.0)
 SHOWN = 6
-"""The frame of the story that the picture shows."""
+"""The frame of the recording that the picture shows."""
 DISTANCES_M = (0.6, 1.0, 1.5, 2.0, 3.0, 4.0)
 
 

@@ -106,7 +106,7 @@ def _compare(wanted: Said, found: Said) -> str:
 
 
 def _plain(values: Iterable[Any]) -> Any:
-    """Words of the registrar as lists that can be compared."""
+    """Data of the registrar as lists that can be compared."""
     return [_plain_one(value) for value in values]
 
 

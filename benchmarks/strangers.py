@@ -23,7 +23,7 @@ from typing import Any
 import click
 import cv2
 import numpy as np
-from false_closures import Told, told
+from false_closures import Plan, plan_of
 from pairs import fused
 from sources import TRUE_BOXES, detector_of, read_source
 from tqdm import tqdm
@@ -77,7 +77,7 @@ def _begin(places: list[list[Keyframe]]) -> None:
     _PLACES[:] = places
 
 
-def places_of(recordings: Sequence[Path], plans: Sequence[Told], frames: int, asked: Any) -> Iterator[list[Keyframe]]:
+def places_of(recordings: Sequence[Path], plans: Sequence[Plan], frames: int, asked: Any) -> Iterator[list[Keyframe]]:
     """The keyframes of every recording, real ones by the detector and simulated ones by their true boxes."""
     for path in recordings:
         with read_source(path, asked, 1) as source:
@@ -97,7 +97,7 @@ def places_of(recordings: Sequence[Path], plans: Sequence[Told], frames: int, as
     "--simulate",
     "plans",
     multiple=True,
-    callback=lambda *given: [told(text) for text in given[2]],
+    callback=lambda *given: [plan_of(text) for text in given[2]],
     help="SCENARIO:SEED[...], as false_closures.py.",
 )
 @click.option("--frames", default=120, show_default=True, help="Frames of a simulated recording.")
@@ -109,7 +109,7 @@ def places_of(recordings: Sequence[Path], plans: Sequence[Told], frames: int, as
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path))
 def main(
     recordings: Sequence[Path],
-    plans: Sequence[Told],
+    plans: Sequence[Plan],
     frames: int,
     count: int,
     model: str,

@@ -38,8 +38,8 @@ class Written:
 
 def cases_of(script: Path) -> list[str]:
     """The names at the beginnings of the lines of a script's docstring, behind its first paragraph."""
-    told = ast.get_docstring(ast.parse(script.read_text()), clean=False) or ""
-    return CASE_LINE.findall(told.partition("\n\n")[2])
+    docstring = ast.get_docstring(ast.parse(script.read_text()), clean=False) or ""
+    return CASE_LINE.findall(docstring.partition("\n\n")[2])
 
 
 def run_generator(of: Written) -> Row:
@@ -59,10 +59,15 @@ def run_generator(of: Written) -> Row:
 
 def _write(of: Written, out: Path) -> None:
     """Run the script; OSError with what it said last where it fails."""
-    told = {"CASE": of.case, "DATA": str(of.data), "OUT": str(out), "STEP": str(of.step)}
+    variables = {"CASE": of.case, "DATA": str(of.data), "OUT": str(out), "STEP": str(of.step)}
     command = [sys.executable, "-B", of.script.name]
     ended = subprocess.run(
-        command, cwd=of.script.parent, env={**os.environ, **told}, capture_output=True, text=True, timeout=PATIENCE_S
+        command,
+        cwd=of.script.parent,
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
     )
     if ended.returncode:
         said = (ended.stderr.strip().splitlines() or ["nothing"])[-1]

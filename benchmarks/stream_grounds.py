@@ -152,7 +152,7 @@ def _plain(message: Any) -> Any:
 
 
 def levelled(plan: RecordingPlan) -> RecordingPlan:
-    """The story as a robot drives it: at one height, with a camera that looks down by `TILT_DEG`."""
+    """The plan as a robot drives it: at one height, with a camera that looks down by `TILT_DEG`."""
     height = float(plan.T_world_camera[:, 2, 3].mean())
     poses = np.array([_driven(T, height) for T in plan.T_world_camera])
     return replace(plan, T_world_camera=poses)

@@ -13,10 +13,10 @@ from objreg_tools.simulation.world.rooms import TABLE_CLASSES
 from objreg_tools.simulation.world.scene import furnished, number, spread
 
 RATE_HZ = 30.0
-PASS = 300  # frames to and fro; a longer story goes so again and again
+PASS = 300  # frames to and fro; a longer recording goes so again and again
 
 
-def table_story(objects: int, frames: int, seed: int) -> RecordingPlan:
+def table_plan(objects: int, frames: int, seed: int) -> RecordingPlan:
     """A camera that goes to and fro before the table."""
     rng = np.random.default_rng([seed, objects])
     table, room = furniture.table(rng, (1.6, 0.9)), furniture.room(rng, (3.0, 3.0))

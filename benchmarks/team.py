@@ -39,7 +39,7 @@ from hosts import Hosts, conditions_of, lack
 from latency import TICKS
 from robots import Robot, Team, simulated, team_of
 from sources import SIMULATED
-from team_ends import GO, READY, SAVE, SAVED, SPENT, TOLD
+from team_ends import GO, READY, REPORT, SAVE, SAVED, SPENT
 
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.data.closures import LoopClosure, robot_of
@@ -69,7 +69,7 @@ class Trouble:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """As tables have it."""
         pause = f", pause of {self.pause_s:g} s" if self.pause_s else ""
         return f"hosts, {self.loss:.0%} lost{pause}" if self.hosts else "one host"
 
@@ -102,28 +102,28 @@ class Field:
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self._domain = private_environment()["ROS_DOMAIN_ID"]
 
-    def start(self, name: str, host: int, profile: str, *words: str) -> None:
-        """Run Python with these words on a host; its output goes to a file of its name."""
+    def start(self, name: str, host: int, profile: str, *arguments: str) -> None:
+        """Run Python with these arguments on a host; its output goes to a file of its name."""
         log = self.folder / f"{name.replace('/', '_')}.log"
-        command = ["sh", "-c", 'exec "$0" "$@" > "$LOG" 2>&1', sys.executable, *words]
+        command = ["sh", "-c", 'exec "$0" "$@" > "$LOG" 2>&1', sys.executable, *arguments]
         self.processes[name] = self._places.start(host, command, {**self._environment(profile), "LOG": str(log)})
 
     def _environment(self, profile: str) -> dict[str, str]:
         if not self._trouble.hosts:
             return {**private_environment(), "ROS_DOMAIN_ID": self._domain}
-        words = {"rmw": "rmw_fastrtps_cpp", "profile": profile, "peers": False}
-        return wireless.environment_of(wireless.Case(**_bare(words)), "")
+        fields = {"rmw": "rmw_fastrtps_cpp", "profile": profile, "peers": False}
+        return wireless.environment_of(wireless.Case(**_bare(fields)), "")
 
-    def node(self, name: str, host: int, room: str, *ros_args: str) -> None:
-        words = [word for pair in ros_args for word in pair.split(" ", 1)]
-        self.start(name, host, WIFI, "-m", f"objreg_ros.{room}.node", "--ros-args", *words)
+    def node(self, name: str, host: int, module: str, *ros_args: str) -> None:
+        arguments = [part for pair in ros_args for part in pair.split(" ", 1)]
+        self.start(name, host, WIFI, "-m", f"objreg_ros.{module}.node", "--ros-args", *arguments)
 
     def require_alive(self) -> None:
-        """ClickException with the last words of a process that failed."""
+        """ClickException with the last lines of a process that failed."""
         for name, process in self.processes.items():
             if process.poll():
-                words = (self.folder / f"{name.replace('/', '_')}.log").read_text().strip().splitlines()[-3:]
-                raise click.ClickException(f"{name} ended with status {process.returncode}: {' / '.join(words)}")
+                lines = (self.folder / f"{name.replace('/', '_')}.log").read_text().strip().splitlines()[-3:]
+                raise click.ClickException(f"{name} ended with status {process.returncode}: {' / '.join(lines)}")
 
     def wait(self, seconds: float, what: str, there: Any) -> bool:
         """Whether it came true in time."""
@@ -143,16 +143,16 @@ class Field:
         for name in names:
             self.processes[name].wait(END_S)
 
-    def told(self) -> dict[str, Any]:
+    def report(self) -> dict[str, Any]:
         """What the witness wrote down last."""
-        path = self.folder / TOLD
-        return dict(json.loads(path.read_text())) if path.exists() else {"told": {}, "closures": [], "hurried": 0}
+        path = self.folder / REPORT
+        return dict(json.loads(path.read_text())) if path.exists() else {"status": {}, "closures": [], "hurried": 0}
 
 
-def _bare(words: Mapping[str, Any]) -> dict[str, Any]:
-    """A case of `wireless` of which only these words matter."""
+def _bare(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """A case of `wireless` of which only these fields matter."""
     rest = dict.fromkeys(("loss", "pause_s", "delay_ms", "mbit", "linger_s"), 0.0)
-    return {**rest, "messages": 0, "size": 0, "seed": 0, **words}
+    return {**rest, "messages": 0, "size": 0, "seed": 0, **fields}
 
 
 def lay_down(team: Team, rate: float, folder: Path) -> None:
@@ -175,8 +175,8 @@ def lay_down(team: Team, rate: float, folder: Path) -> None:
 def messages(robot: str, frame: Frame, names: dict[int, str]) -> Iterator[tuple[str, Any]]:
     """What a segmenter in the robot's namespace says of a frame, after its odometry."""
     if frame.T_odom_camera is not None:
-        word = Odometry(T_odom_body=frame.T_odom_camera, stamp_ns=frame.stamp_ns, child_frame_id=frame.frame_id)
-        yield "odom", to_msg.odometry(replace(word, frame_id=f"{robot}/odom"))
+        odometry = Odometry(T_odom_body=frame.T_odom_camera, stamp_ns=frame.stamp_ns, child_frame_id=frame.frame_id)
+        yield "odom", to_msg.odometry(replace(odometry, frame_id=f"{robot}/odom"))
     yield "view", to_msg.view(frame)
     yield "view/camera_info", to_msg.view_camera_info(frame)
     yield "gravity", to_msg.gravity(frame)
@@ -203,11 +203,11 @@ def measure(team: Team, trouble: Trouble, laid: Path) -> dict[str, Any]:
         field.wait(1e4, "all frames", lambda: all(field.processes[f"{r}/drive"].poll() == 0 for r in team))
         usage, load = meter.figures(), [*load, os.getloadavg()[0]]
         frames = {name: len(robot.frames) for name, robot in team.items()}
-        settled = field.wait(SETTLE_S, "all keyframes", lambda: is_settled(field.told()["told"], frames))
-        before = field.told()
+        settled = field.wait(SETTLE_S, "all keyframes", lambda: is_settled(field.report()["status"], frames))
+        before = field.report()
         last = end_all(field)
-        words = field.told()
-        figures = figures_of(team, before["told"], words, field.folder / "team.db")
+        after = field.report()
+        figures = figures_of(team, before["status"], after, field.folder / "team.db")
         return {**figures, "settled": settled, "last": last, **usage, "load": load}
 
 
@@ -225,18 +225,18 @@ def start_all(field: Field) -> None:
 
     def there() -> bool:
         ready = all(Path(field.folder, f"{READY}_{robot}").exists() for robot in field.robots)
-        told = field.told()["told"]
-        met = [int(told.get("registrar", {}).get(f"connected: /{robot}/keyframes", 0)) for robot in field.robots]
-        return ready and nodes <= told.keys() and all(met)
+        status = field.report()["status"]
+        met = [int(status.get("registrar", {}).get(f"connected: /{robot}/keyframes", 0)) for robot in field.robots]
+        return ready and nodes <= status.keys() and all(met)
 
     if not field.wait(START_S, "all to find each other", there):
-        raise click.ClickException(f"expected {', '.join(nodes)} to meet, known {', '.join(field.told()['told'])}")
+        raise click.ClickException(f"expected {', '.join(nodes)} to meet, known {', '.join(field.report()['status'])}")
 
 
-def is_settled(told: Mapping[str, Mapping[str, str]], frames: Mapping[str, int]) -> bool:
+def is_settled(status: Mapping[str, Mapping[str, str]], frames: Mapping[str, int]) -> bool:
     """Whether every frame came to its keyframer, and every keyframe of it to the end of its search."""
-    keyframers = {robot: told[f"{robot}/keyframer"] for robot in frames}
-    here = told["registrar"]
+    keyframers = {robot: status[f"{robot}/keyframer"] for robot in frames}
+    here = status["registrar"]
     followed = all(int(keyframers[r]["received"]) >= n and keyframers[r]["waiting"] == "0" for r, n in frames.items())
     sent = sum(int(keyframer["keyframes sent"]) for keyframer in keyframers.values())
     return followed and int(here["received"]) >= sent and here["waiting"] == "0"
@@ -244,9 +244,9 @@ def is_settled(told: Mapping[str, Mapping[str, str]], frames: Mapping[str, int])
 
 def end_all(field: Field) -> int:
     """End the keyframers, save, and end the registrar; how many keyframes came of what the keyframers had left."""
-    received = int(field.told()["told"]["registrar"]["received"])
+    received = int(field.report()["status"]["registrar"]["received"])
     field.end(*(f"{robot}/keyframer" for robot in field.robots))
-    came = lambda: int(field.told()["told"]["registrar"]["received"]) - received  # noqa: E731
+    came = lambda: int(field.report()["status"]["registrar"]["received"]) - received  # noqa: E731
     field.wait(LAST_S, "the last keyframe of each robot", lambda: came() >= len(field.robots))
     Path(field.folder, SAVE).touch()
     field.wait(END_S, "the registrar to save", Path(field.folder, SAVED).exists)
@@ -267,7 +267,7 @@ class Meter:
         self._begun = {name: processor_seconds(pid) for name, pid in self._pids.items()}
 
     def figures(self) -> dict[str, Any]:
-        """Percent of one core since the start, by process; those that published frames have ended, and told theirs."""
+        """Percent of one core since the start, by process; those that published frames have ended, and wrote theirs."""
         seconds = time.monotonic() - self._start
         spent = {name: processor_seconds(pid) - self._begun[name] for name, pid in self._pids.items()}
         for robot in self._field.robots:
@@ -289,18 +289,18 @@ def machine_seconds() -> float:
 
 
 def figures_of(
-    team: Team, told: Mapping[str, Mapping[str, str]], received: Mapping[str, Any], store: Path
+    team: Team, status: Mapping[str, Mapping[str, str]], received: Mapping[str, Any], store: Path
 ) -> dict[str, Any]:
     """What a run came to."""
-    here = told["registrar"]
+    here = status["registrar"]
     stored = stored_keyframes(store)
     count = lambda robot, what: int(here.get(f"{robot}: keyframes {what}", 0))  # noqa: E731
     robots = {
         robot: {
-            "frames": int(told[f"{robot}/keyframer"]["published"]),
-            "sent": int(told[f"{robot}/keyframer"]["keyframes sent"]),
+            "frames": int(status[f"{robot}/keyframer"]["published"]),
+            "sent": int(status[f"{robot}/keyframer"]["keyframes sent"]),
             **{what: count(robot, what) for what in ("received", "searched", "stored unsearched")},
-            "kilobytes": float(told[f"{robot}/keyframer"].get("kilobytes a keyframe", "nan")),
+            "kilobytes": float(status[f"{robot}/keyframer"].get("kilobytes a keyframe", "nan")),
             "kept": sum(of == robot for of, _ in stored),
             "kept twice": sum(n - 1 for (of, _), n in stored.items() if of == robot),
         }
@@ -311,11 +311,11 @@ def figures_of(
         for stage in ("search", "wait", "total")
     }
     dropped = {
-        node: {key: int(value) for key, value in words.items() if key.startswith(("dropped: ", "lost in"))}
-        for node, words in told.items()
+        node: {key: int(value) for key, value in values.items() if key.startswith(("dropped: ", "lost in"))}
+        for node, values in status.items()
     }
     truths = Truths({name: robot.truth for name, robot in team.items()})
-    found = [closure_of(words, list(team)) for words in received["closures"]]
+    found = [closure_of(row, list(team)) for row in received["closures"]]
     errors = [(closure, error) for closure in found if (error := truths.error(closure)) is not None]
     wrong = [closure for closure, error in errors if not within(error, FALSE)]
     return {
@@ -323,7 +323,7 @@ def figures_of(
         "ms": stages,
         "hurried": received["hurried"] - sum(n["stored unsearched"] for n in robots.values()),
         "refused": {key.split()[1]: int(value) for key, value in here.items() if key.startswith("rejected: ")},
-        "dropped": {node: words for node, words in dropped.items() if words},
+        "dropped": {node: counts for node, counts in dropped.items() if counts},
         "closures": len(found),
         "false": len(wrong),
         "between": sum(closure.from_robot != closure.to_robot for closure in found),
@@ -338,15 +338,15 @@ def stored_keyframes(path: Path) -> Counter[tuple[str, int]]:
         return Counter((k.robot, k.stamp_ns) for k in map(store.keyframe, store.keyframe_ids()))
 
 
-def closure_of(words: Mapping[str, Any], robots: Sequence[str]) -> LoopClosure:
+def closure_of(row: Mapping[str, Any], robots: Sequence[str]) -> LoopClosure:
     """The closure that the witness wrote down, with its robots by its frames."""
     import numpy as np
 
-    (from_frame, from_ns), (to_frame, to_ns) = words["from"], words["to"]
+    (from_frame, from_ns), (to_frame, to_ns) = row["from"], row["to"]
     return LoopClosure(
         from_ns=from_ns,
         to_ns=to_ns,
-        T_from_to=np.array(words["T_from_to"]),
+        T_from_to=np.array(row["T_from_to"]),
         covariance=np.eye(6),
         labels=(),
         from_frame_id=from_frame,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ends of benchmarks/team.py: one in place of a robot's segmenter and odometry, and one beside the registrar.
 
-They and the script share a folder, for they have one machine. A file in it tells that a robot's listeners are there,
+They and the script share a folder, for they have one machine. A file in it says that a robot's listeners are there,
 another when to start, by the clock that never jumps.
 """
 
@@ -17,7 +17,7 @@ from typing import Any
 
 import click
 
-READY, GO, SPENT, SAVE, SAVED, TOLD = "ready", "go", "spent", "save", "saved", "told.json"
+READY, GO, SPENT, SAVE, SAVED, REPORT = "ready", "go", "spent", "save", "saved", "report.json"
 LINGER_S = 2.0  # after the last frame, in which what is late may come
 FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 LATCHED = "labels"  # which the registrar receives too
@@ -89,7 +89,7 @@ def _await(node: Any, there: Callable[[], bool]) -> None:
 @main.command()
 @click.argument("folder", type=FOLDER)
 def receive(folder: Path) -> None:
-    """Write down once a second what nodes tell of themselves, until the process is ended.
+    """Write down once a second what nodes report of themselves, until the process is ended.
 
     And the constraints so far, and for how many keyframes some place was not looked at, for want of time.
     """
@@ -104,18 +104,18 @@ def receive(folder: Path) -> None:
     profile.apply()
     rclpy.init(args=[])
     node = rclpy.create_node("witness")
-    told: dict[str, dict[str, str]] = {}
+    latest: dict[str, dict[str, str]] = {}
     closures: list[dict[str, Any]] = []
     hurried: set[int] = set()  # stamps of keyframes
-    node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: _note(told, message), qos.stage(100))
+    node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: _note(latest, message), qos.stage(100))
     kept = qos.latched(qos.KEPT_CONSTRAINTS)
     node.create_subscription(Odometry, "constraints", lambda message: closures.append(_closure(message)), kept)
     node.create_subscription(
         DiagnosticArray, "refusals", lambda m: hurried.update(_hurried(m)), qos.stage(qos.REFUSALS)
     )
     saver = node.create_client(Trigger, "registrar/save")
-    words = lambda: {"told": told, "closures": closures, "hurried": len(hurried)}  # noqa: E731
-    node.create_timer(1.0, lambda: _write(folder / TOLD, words()))
+    report = lambda: {"status": latest, "closures": closures, "hurried": len(hurried)}  # noqa: E731
+    node.create_timer(1.0, lambda: _write(folder / REPORT, report()))
     _await(node, Path(folder, SAVE).exists)
     done = saver.call_async(Trigger.Request())
     _await(node, done.done)
@@ -123,11 +123,11 @@ def receive(folder: Path) -> None:
     _await(node, lambda: False)
 
 
-def _note(told: dict[str, dict[str, str]], message: Any) -> None:
+def _note(latest: dict[str, dict[str, str]], message: Any) -> None:
     for status in message.status:
         name, _, what = status.name.strip("/").partition(": ")
         if what == "frames":
-            told[name] = {pair.key: pair.value for pair in status.values}
+            latest[name] = {pair.key: pair.value for pair in status.values}
 
 
 def _hurried(message: Any) -> set[int]:
@@ -146,10 +146,10 @@ def _closure(message: Any) -> dict[str, Any]:
     return {**ends, "T_from_to": closure.T_from_to.tolist()}
 
 
-def _write(path: Path, words: Any) -> None:
-    """A reader finds the words before or these, whole."""
+def _write(path: Path, report: Any) -> None:
+    """A reader finds the report before or this one, whole."""
     part = path.with_suffix(".part")
-    part.write_text(json.dumps(words))
+    part.write_text(json.dumps(report))
     os.replace(part, path)
 
 

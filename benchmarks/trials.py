@@ -236,13 +236,13 @@ class _Worker:
         self.book.tries += 1
         self.book.refused += kind == "refused"
         if error is not None and kind != "refused":
-            self._tell(seed, kind, f"{type(error).__name__}: {error}"[:300], _where(error))
+            self._report(seed, kind, f"{type(error).__name__}: {error}"[:300], _where(error))
         for path in self._fence.crossed():
-            self._tell(seed, "outside", f"{path}"[:300], "" if error is None else _where(error))
+            self._report(seed, "outside", f"{path}"[:300], "" if error is None else _where(error))
         if _peak_mb() - before > GREED_MB:
-            self._tell(seed, "greed", f"{_peak_mb() - before:.0f} MB", "" if error is None else _where(error))
+            self._report(seed, "greed", f"{_peak_mb() - before:.0f} MB", "" if error is None else _where(error))
 
-    def _tell(self, *finding: Any) -> None:
+    def _report(self, *finding: Any) -> None:
         os.write(self._writer, json.dumps(finding).encode() + b"\n")
 
 
@@ -282,7 +282,7 @@ def _where(error: BaseException) -> str:
 
 
 def _last_stack(log: Path) -> str:
-    """The innermost line of the package that the log of a process that crashed tells of."""
+    """The innermost line of the package that is named by the log of a process that crashed."""
     lines = log.read_text(errors="replace").splitlines()
     crashed = next((k for k, line in enumerate(lines) if line.startswith("Fatal Python error")), None)
     if crashed is None:

@@ -64,13 +64,13 @@ def receive(out: TextIO) -> None:
     import rclpy
     from sensor_msgs.msg import CompressedImage
 
-    def tell(message: Any) -> None:
+    def write_down(message: Any) -> None:
         stamp = message.header.stamp
         print(message.format, f"{time.time() - stamp.sec - stamp.nanosec * 1e-9:.4f}", file=out, flush=True)
 
     rclpy.init()
     node = rclpy.create_node("receiver")
-    node.create_subscription(CompressedImage, TOPIC, tell, qos())
+    node.create_subscription(CompressedImage, TOPIC, write_down, qos())
     try:
         rclpy.spin(node)
     except (KeyboardInterrupt, rclpy.executors.ExternalShutdownException):

@@ -277,7 +277,7 @@ def besieged(calls: ModuleType, kind: str, folder: Path, **more: Any) -> Any:
     """A siege without its node."""
     siege: Any = object.__new__(getattr(calls, kind))
     siege.tally, siege.name, siege._home = script("trials").Tally(), "registrar", calls._home(folder)
-    siege._before, siege._stored, siege._last_words = calls.contents(siege._home), 4, lambda: ""
+    siege._before, siege._stored, siege._last_line = calls.contents(siege._home), 4, lambda: ""
     siege.__dict__.update(more)
     return siege
 

@@ -43,26 +43,26 @@ def refused(metres: float | None, reason: Reason) -> Rejected:
     ],
 )
 def test_a_recording_is_named_by_scenario_seed_camera_and_stress(text: str, plan: tuple) -> None:
-    from false_closures import told
+    from false_closures import plan_of
 
-    assert told(text) == (*plan, "kinect_v1", ())
+    assert plan_of(text) == (*plan, "kinect_v1", ())
 
 
 def test_a_recording_may_name_its_sensor_and_what_is_wrong_with_it() -> None:
-    from false_closures import told
+    from false_closures import plan_of
 
-    plan = told("loop:7:sensor=realsense_d435:lens=0.1,0,0,0:lag_ms=25:stress")
+    plan = plan_of("loop:7:sensor=realsense_d435:lens=0.1,0,0,0:lag_ms=25:stress")
     assert plan == ("loop", 7, "realsense_d435", True, "realsense_d435", ("rig.lag_ms=25", "rig.distortion=0.1,0,0,0"))
     assert plan.name == "loop 7, realsense_d435, realsense_d435 depth, lag_ms=25, distortion=0.1,0,0,0, stress"
-    assert told("loop:7:qvga:sensor=azure_kinect")[2:5] == ("qvga", False, "azure_kinect")
+    assert plan_of("loop:7:qvga:sensor=azure_kinect")[2:5] == ("qvga", False, "azure_kinect")
 
 
 @pytest.mark.parametrize("text", WRONG)
 def test_what_names_no_recording_is_refused(text: str) -> None:
-    from false_closures import told
+    from false_closures import plan_of
 
     with pytest.raises(click.BadParameter, match="expected SCENARIO:SEED"):
-        told(text)
+        plan_of(text)
 
 
 def test_closures_are_counted_by_truth_and_by_what_speaks_for_them_and_right_refusals_by_reason() -> None:

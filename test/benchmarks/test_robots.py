@@ -107,9 +107,9 @@ def test_each_its_own_ties_the_robots_and_says_what_it_sent(robots: ModuleType) 
     between = [closure for closure in closures if closure.from_robot != closure.to_robot]
     assert between and all(closure.from_ns < closure.to_ns for closure in between)
     for name, seconds in (("a", 5), ("b", 4)):
-        books = said["books"][name]
-        assert said["kB_per_s"][name] == pytest.approx(1e-3 * books["bytes sent"] / seconds)
-        assert books["summaries sent"] == 3 and said["waiting"][name] == 0
+        counters = said["counters"][name]
+        assert said["kB_per_s"][name] == pytest.approx(1e-3 * counters["bytes sent"] / seconds)
+        assert counters["summaries sent"] == 3 and said["waiting"][name] == 0
     assert 200 < said["summary_bytes"]["p50"] <= said["summary_bytes"]["most"] < 2000
 
 
