@@ -36,7 +36,7 @@ Laid = list[tuple[ObjectModel, Array]]
 
 
 PLAN_FRAMES = 120
-"""A story of so few frames costs little and passes every place."""
+"""A recording of so few frames costs little and passes every place."""
 
 
 HARD_LABELS = (
@@ -67,7 +67,7 @@ def plain_scene(rng: Rng) -> tuple[Scene, Array]:
     """A room or a scenario just as the simulator makes it, and the camera poses of the scenario ``(N, 4, 4)``."""
     if rng.random() < 0.5:
         return random_scene(_seed(rng)), np.zeros((0, 4, 4))
-    return _story(rng)
+    return _of_scenario(rng)
 
 
 def hard_scene(rng: Rng) -> tuple[Scene, Array]:
@@ -75,7 +75,7 @@ def hard_scene(rng: Rng) -> tuple[Scene, Array]:
     if rng.random() < 0.75:
         scene, poses = random_scene(_seed(rng), HARD_LABELS, rng.uniform(0.25, 0.55)), np.zeros((0, 4, 4))
     else:
-        scene, poses = _story(rng)
+        scene, poses = _of_scenario(rng)
     return (with_look_alikes(scene, rng) if rng.random() < 0.5 else scene), poses
 
 
@@ -91,7 +91,7 @@ def with_look_alikes(scene: Scene, rng: Rng) -> Scene:
     return scene.with_objects([other(placed) for placed in scene.objects])
 
 
-def _story(rng: Rng) -> tuple[Scene, Array]:
+def _of_scenario(rng: Rng) -> tuple[Scene, Array]:
     """One of the scenes of a scenario and the camera poses in it."""
     plan = make_plan(str(rng.choice(list(OF_ONE_DAY))), _seed(rng), PLAN_FRAMES)
     chosen = int(rng.integers(len(plan.scenes)))
