@@ -128,7 +128,7 @@ class Careless:
 
 
 @pytest.mark.parametrize(
-    ("kind", "fault", "words"),
+    ("kind", "fault", "finding"),
     [
         (b"OXS", "summaries", "an honest summary is not asked for"),
         (b"OXD", "deliveries", "an honest keyframe that was asked for is not taken"),
@@ -136,12 +136,12 @@ class Careless:
     ],
 )
 def test_an_exchange_that_can_be_silenced_is_seen_and_ours_is_not(
-    kind: bytes, fault: str, words: str, tmp_path: Path
+    kind: bytes, fault: str, finding: str, tmp_path: Path
 ) -> None:
     peers = script("attacked_peers")
     assert found(peers.exchange_attempt(kind, tmp_path)) == {"passed"}
     careless = peers.exchange_attempt(kind, tmp_path, lambda side: Careless(side.exchange(), fault))
-    assert words in str(first(careless, "wrong"))
+    assert finding in str(first(careless, "wrong"))
 
 
 # -------------------------------------------------------------------------------------------------------------- results
@@ -195,11 +195,11 @@ def test_a_command_that_writes_over_what_it_reads_is_seen_and_that_is_restored(t
 
         def invoke(self, context: click.Context) -> None:
             """Write."""
-            Path(self.words[-1]).write_text("overwritten")
+            Path(self.arguments[-1]).write_text("overwritten")
 
         def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
-            """Take any words."""
-            self.words = list(args)
+            """Take any arguments."""
+            self.arguments = list(args)
             return []
 
     attempt = commands.outputs_attempt(tmp_path, Unguarded())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The attacks: no spoilt message gets anything else out of a decoder than a word, ValueError or OSError; and what the
+"""The attacks: no spoilt message gets anything else out of a decoder than data, ValueError or OSError; and what the
 attacks would see if it did."""
 
 from __future__ import annotations

@@ -46,10 +46,10 @@ def test_one_worker_is_killed_when_so_many_have_ended(batch: ModuleType, monkeyp
     assert killed == [(2, signal.SIGKILL)]
 
 
-def test_a_run_is_told_by_how_much_faster_it_was_than_the_first(batch: ModuleType) -> None:
+def test_a_run_is_reported_by_how_much_faster_it_was_than_the_first(batch: ModuleType) -> None:
     first = {"seconds": 90.0, "recording_s": 10.0, "constraints": 7, "same": True}
-    told = batch.line("2", {"seconds": 60.0, "recording_s": 12.5, "constraints": 6, "same": False}, first)
-    assert told.split() == ["2", "60.0", "1.50", "12.50", "6", "NO"]
+    line = batch.line("2", {"seconds": 60.0, "recording_s": 12.5, "constraints": 6, "same": False}, first)
+    assert line.split() == ["2", "60.0", "1.50", "12.50", "6", "NO"]
     assert batch.line("1", first, first).split() == ["1", "90.0", "1.00", "10.00", "7", "yes"]
 
 

@@ -14,13 +14,13 @@ from objreg_tools.truth import Truth
 
 
 def test_the_error_of_a_trajectory_is_that_of_every_frame_at_rest_or_not() -> None:
-    """Odometry rests at the corners of a square, at the last for most of the time, and tells their heights wrong."""
+    """Odometry rests at the corners of a square, at the last for most of the time, and has their heights wrong."""
     from closers import trajectory_errors
 
     corners = [(0.0, 0.0, 0.04, 5), (1.0, 0.0, -0.04, 5), (1.0, 1.0, 0.04, 5), (0.0, 1.0, -0.1, 40)]
     true = [pose(np.eye(3), np.array([x, y, 0.0])) for x, y, _, count in corners for _ in range(count)]
-    told = [pose(np.eye(3), np.array([x, y, z])) for x, y, z, count in corners for _ in range(count)]
-    frames = [SimpleNamespace(stamp_ns=k * 10**8, T_odom_camera=T) for k, T in enumerate(told)]
+    estimated = [pose(np.eye(3), np.array([x, y, z])) for x, y, z, count in corners for _ in range(count)]
+    frames = [SimpleNamespace(stamp_ns=k * 10**8, T_odom_camera=T) for k, T in enumerate(estimated)]
     truth = Truth((k * 10**8, T) for k, T in enumerate(true))
-    expected = pytest.approx(absolute_trajectory_error(told, true), rel=1e-6)
+    expected = pytest.approx(absolute_trajectory_error(estimated, true), rel=1e-6)
     assert trajectory_errors(frames, [], truth) == (expected, expected, 0)  # type: ignore[arg-type]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of what is told of packed keyframes."""
+"""Tests of the figures of packed keyframes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_tools.simulation.drawn_place import drawn
 
 
-def test_sizes_are_told_whole_and_within_the_bound_with_what_came_back() -> None:
+def test_sizes_are_given_whole_and_within_the_bound_with_what_came_back() -> None:
     from compact import sizes
 
     keyframes = [fuse(FrameWindow.of(drawn(stamp_ns)), RegistrarParams()) for stamp_ns in (0, 1)]
@@ -35,8 +35,8 @@ def test_errors_are_those_of_pairs_that_both_ways_accept() -> None:
         Row(None, False, 1.0),
     ]
     after = [Row((2.0, 4.0), True, 1.0), Row((0.2, 1.0), False, 1.0), Row((3.0, 0.1), False, 1.0), before[1]]
-    told = compared(pairs, before, after)
-    assert told["both_accept"] == 1 and told["verdicts_changed"] == 2
-    assert (told["as_it_was"]["translation_cm"], told["as_it_came"]["translation_cm"]) == (1.0, 4.0)
-    assert (told["as_it_was"]["wrong"], told["as_it_came"]["wrong"]) == (0, 0)
-    assert told["as_it_was"]["accepted_recall"] == 2 / 3 and told["as_it_came"]["accepted_recall"] == 1 / 3
+    figures = compared(pairs, before, after)
+    assert figures["both_accept"] == 1 and figures["verdicts_changed"] == 2
+    assert (figures["as_it_was"]["translation_cm"], figures["as_it_came"]["translation_cm"]) == (1.0, 4.0)
+    assert (figures["as_it_was"]["wrong"], figures["as_it_came"]["wrong"]) == (0, 0)
+    assert figures["as_it_was"]["accepted_recall"] == 2 / 3 and figures["as_it_came"]["accepted_recall"] == 1 / 3

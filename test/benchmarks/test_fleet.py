@@ -50,8 +50,8 @@ def tie(
     a, b = (seen[robot][k] for robot, k in (one, other))
     T = inverse(a.T_world_camera) @ b.T_world_camera
     T[0, 3] += off
-    told: dict[str, Any] = {"covariance": np.eye(6), "labels": (), "from_robot": one[0], "to_robot": other[0]}
-    return LoopClosure(from_ns=a.stamp_ns, to_ns=b.stamp_ns, T_from_to=T, **told)
+    fields: dict[str, Any] = {"covariance": np.eye(6), "labels": (), "from_robot": one[0], "to_robot": other[0]}
+    return LoopClosure(from_ns=a.stamp_ns, to_ns=b.stamp_ns, T_from_to=T, **fields)
 
 
 def test_a_meeting_is_a_keyframe_that_saw_what_another_robot_had_seen_before(seen: dict[str, list[SeenPlace]]) -> None:
@@ -86,16 +86,16 @@ def test_a_right_constraint_closes_its_keyframe_and_its_stretch(
     from fleet import judged, meetings
 
     ties = [tie(seen, ("a", 0), ("b", 1)), tie(seen, ("c", 1), ("b", 4)), tie(seen, ("a", 2), ("b", 3), off=1.0)]
-    told = judged(meetings(seen), [*ties, tie(seen, ("a", 0), ("a", 1))], truths)
-    assert (told["constraints"], told["true"], told["false"]) == (3, 2, 1)
-    assert told["stretches"] == {"closed": 2, "of": 5}
-    assert told["keyframes"] == {"closed": 3, "of": 7}  # two of them within a second of one constraint
-    assert told["view_change"]["0-30"] == told["keyframes"] and told["view_change"]["60-120"]["of"] == 0
-    assert told["robots"]["a-b"] == {"closed": 1, "of": 2} and told["robots"]["c-b"] == {"closed": 0, "of": 1}
+    figures = judged(meetings(seen), [*ties, tie(seen, ("a", 0), ("a", 1))], truths)
+    assert (figures["constraints"], figures["true"], figures["false"]) == (3, 2, 1)
+    assert figures["stretches"] == {"closed": 2, "of": 5}
+    assert figures["keyframes"] == {"closed": 3, "of": 7}  # two of them within a second of one constraint
+    assert figures["view_change"]["0-30"] == figures["keyframes"] and figures["view_change"]["60-120"]["of"] == 0
+    assert figures["robots"]["a-b"] == {"closed": 1, "of": 2} and figures["robots"]["c-b"] == {"closed": 0, "of": 1}
 
 
 def test_without_constraints_nothing_is_closed(seen: dict[str, list[SeenPlace]], truths: Truths) -> None:
     from fleet import judged, meetings
 
-    told = judged(meetings(seen), [], truths)
-    assert told["stretches"] == {"closed": 0, "of": 5} and told["false"] == 0
+    figures = judged(meetings(seen), [], truths)
+    assert figures["stretches"] == {"closed": 0, "of": 5} and figures["false"] == 0

@@ -61,7 +61,7 @@ def test_without_root_it_says_so_in_one_line(hosts: ModuleType, monkeypatch: pyt
 
 
 def test_without_namespaces_it_says_so(hosts: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_words: str) -> str:
+    def refused(*_arguments: str) -> str:
         raise OSError("`ip netns add` says: Operation not permitted")
 
     for name, value in {"os.geteuid": lambda: 0, "shutil.which": str}.items():
@@ -71,9 +71,9 @@ def test_without_namespaces_it_says_so(hosts: ModuleType, monkeypatch: pytest.Mo
     assert "expected network namespaces, got none: `ip netns add` says: Operation not permitted" in hosts.lack()
 
 
-def test_the_words_for_netem_say_what_the_conditions_say(hosts: ModuleType) -> None:
-    words = " ".join(hosts.netem("eth0", hosts.conditions_of(0.2, 20.0, 6.0, 1)))
-    assert words == "tc qdisc replace dev eth0 root netem limit 1000 delay 20ms loss 20% rate 6000000bit"
+def test_the_command_for_netem_says_what_the_conditions_say(hosts: ModuleType) -> None:
+    command = " ".join(hosts.netem("eth0", hosts.conditions_of(0.2, 20.0, 6.0, 1)))
+    assert command == "tc qdisc replace dev eth0 root netem limit 1000 delay 20ms loss 20% rate 6000000bit"
     assert "rate" not in hosts.netem("eth0", hosts.conditions_of(0.0, 0.0, None, 1))
 
 

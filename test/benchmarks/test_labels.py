@@ -25,8 +25,8 @@ def sight(instance: int, label: str, x_min: int) -> TrueSight:
 def part(label: str, x_min: int) -> VisiblePart:
     mask = np.ones((20, 40), bool)
     off = np.zeros(mask.shape)
-    thing = MappedObject(landmark=1, label=label, views=())
-    return VisiblePart(object=thing, mask=mask, corner=(x_min, 10), off=off, whole=800.0)
+    mapped = MappedObject(landmark=1, label=label, views=())
+    return VisiblePart(object=mapped, mask=mask, corner=(x_min, 10), off=off, whole=800.0)
 
 
 def test_labels_are_right_by_their_boxes_and_true_boxes_are_found_by_labels_and_detector() -> None:

@@ -38,7 +38,7 @@ def test_a_queue_that_is_full_loses_what_comes(lossy_link: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.05, 0.2, 1.0])
-def test_as_many_are_lost_as_the_link_is_told_to_lose(lossy_link: ModuleType, loss: float) -> None:
+def test_as_many_are_lost_as_the_link_is_set_to_lose(lossy_link: ModuleType, loss: float) -> None:
     link = lossy_link.Link(lossy_link.Conditions(loss=loss, seed=3))
     lost = sum(link.arrival_s(float(k), 1) is None for k in range(10_000)) / 10_000
     assert abs(lost - loss) <= 4 * math.sqrt(loss * (1 - loss) / 10_000)
@@ -116,9 +116,9 @@ def test_a_pause_of_one_port_cuts_that_one_off_both_ways_and_leaves_the_others(
     relay.pause(60.0, [0])
     first.send(ALL + A + b"lost")
     second.send(ALL + B + b"to the third")
-    for end, words in ((third, [ALL + B + b"to the third"]), (second, []), (first, [])):
-        end.settimeout(5.0 if words else 0.05)
-        assert [end.recv(100) for _ in words] == words
+    for end, expected in ((third, [ALL + B + b"to the third"]), (second, []), (first, [])):
+        end.settimeout(5.0 if expected else 0.05)
+        assert [end.recv(100) for _ in expected] == expected
         end.settimeout(0.05)
         with pytest.raises(TimeoutError):
             end.recv(100)

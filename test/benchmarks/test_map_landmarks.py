@@ -79,13 +79,13 @@ def test_without_places_closures_alone_say_what_is_one_landmark() -> None:
     from map_landmarks import named
 
     assert len(shown()[0].sightings) == len(shown()[-1].sightings) == 1
-    word = LoopClosure(
+    closure = LoopClosure(
         from_ns=STAMPS[0], to_ns=STAMPS[-1], T_from_to=np.eye(4), covariance=0.01 * np.eye(6), labels=("cup",)
     )
-    alone, closed = named(shown(), None), named(shown(), None, [word])
+    alone, closed = named(shown(), None), named(shown(), None, [closure])
     assert len({number for row in alone for number in row}) == sum(len(row) for row in alone)
     assert closed[0] == closed[-1] and len({n for row in closed for n in row}) == sum(len(row) for row in alone) - 1
-    elsewhere = replace(word, T_from_to=pose(np.eye(3), np.array([0.5, 0.0, 0.0])))
+    elsewhere = replace(closure, T_from_to=pose(np.eye(3), np.array([0.5, 0.0, 0.0])))
     assert named(shown(), None, [elsewhere]) == alone
 
 
@@ -116,14 +116,14 @@ def test_sightings_are_moved_to_the_graphs_keyframes_and_those_that_tie_nothing_
     assert not len(marks_of(graph, seen, [tuple(next(number) for _ in one.sightings) for one in seen]).nodes)
 
 
-def test_how_far_sightings_wander_is_told_and_exact_ones_do_not() -> None:
+def test_how_far_sightings_wander_is_measured_and_exact_ones_do_not() -> None:
     from map_landmarks import exact, named, wandering
 
     truth = Truth(zip(STAMPS, TRUE, strict=True))
     nearer = [replace(one, xyz=one.xyz * (0.97 if k % 2 else 1.0)) for k, one in enumerate(shown())]
     names = named(nearer, truth.at)
-    told = wandering(nearer, names, truth)
-    assert told["landmarks"] == len(OBJECTS) and told["shares"][1] > told["shares"][0]
+    figures = wandering(nearer, names, truth)
+    assert figures["landmarks"] == len(OBJECTS) and figures["shares"][1] > figures["shares"][0]
     none = wandering(exact(nearer, names, truth), names, truth)
     assert none["along_cm"] == pytest.approx(0.0, abs=1e-6)
 
@@ -142,19 +142,19 @@ def test_a_recording_is_compared_with_and_without_landmarks_for_each_drift() -> 
     from map_limits import ODOMETRY, Case
 
     frames = [frame(1e-9 * stamp, (), T) for stamp, T in zip(STAMPS, TRUE, strict=True)]
-    word = LoopClosure(from_ns=0, to_ns=STAMPS[-1], T_from_to=np.eye(4), covariance=1e-6 * np.eye(6), labels=())
-    told = compare(Case("walk", frames, Truth(zip(STAMPS, TRUE, strict=True)), [word]), shown(), 2)
-    means = {name: np.mean(cm) for name, cm in told["cm"].items()}
-    assert {len(cm) for cm in told["cm"].values()} == {2} and told["landmarks"] == len(OBJECTS)
+    closure = LoopClosure(from_ns=0, to_ns=STAMPS[-1], T_from_to=np.eye(4), covariance=1e-6 * np.eye(6), labels=())
+    figures = compare(Case("walk", frames, Truth(zip(STAMPS, TRUE, strict=True)), [closure]), shown(), 2)
+    means = {name: np.mean(cm) for name, cm in figures["cm"].items()}
+    assert {len(cm) for cm in figures["cm"].values()} == {2} and figures["landmarks"] == len(OBJECTS)
     assert means["by true places, seen exactly"] < means[BASE] < means[ODOMETRY]
 
 
-def test_the_table_tells_the_means_and_in_how_many_drifts_landmarks_help() -> None:
+def test_the_table_gives_the_means_and_in_how_many_drifts_landmarks_help() -> None:
     from map_landmarks import BASE, table
 
-    told = {
+    figures = {
         "closures": 2, "sightings": 9, "landmarks": 3, "extent_cm": 20.0, "across_cm": 1.0, "along_cm": 2.0,
         "shares": [0.05, 0.1], "cm": {BASE: [1.0, 2.0], "landmarks": [0.5, 2.5]}, "left_out": {"landmarks": [1, 2]},
     }  # fmt: skip
-    row = table("walk", told).splitlines()[-1].split()
+    row = table("walk", figures).splitlines()[-1].split()
     assert row == ["landmarks", "1.50", "0.50", "2.50", "1.00", "1/2", "1.5"]

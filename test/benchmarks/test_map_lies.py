@@ -25,15 +25,16 @@ def test_every_method_is_judged_on_the_same_closures() -> None:
 def test_a_walk_without_a_false_closure_counts_for_nothing() -> None:
     import map_lies
 
-    words = [map_lies.drawn(seed)[0] for seed in range(20)]
-    told_nothing = [seed for seed, one in enumerate(words) if not one.is_false.any() or one.is_false.all()]
-    assert told_nothing and all(map_lies.one(seed, []) is None for seed in told_nothing)
+    walks = [map_lies.drawn(seed)[0] for seed in range(20)]
+    uncounted = [seed for seed, one in enumerate(walks) if not one.is_false.any() or one.is_false.all()]
+    assert uncounted and all(map_lies.one(seed, []) is None for seed in uncounted)
 
 
 def test_the_share_of_what_is_too_much_counts_graphs_that_were_lost() -> None:
     import map_lies
 
     methods = [{"ours": {"ratio": ratio, "false_kept": 1, "right_pruned": 2}} for ratio in (1.0, 1.1, 1.5, np.inf)]
-    told = map_lies.summary([{"methods": one} for one in methods])["ours"]
-    assert (told["above_1.3"], told["above_2"], told["false_kept"], told["right_pruned"]) == (0.5, 0.25, 4, 8)
-    assert told["p99"] == np.inf
+    figures = map_lies.summary([{"methods": one} for one in methods])["ours"]
+    assert (figures["above_1.3"], figures["above_2"]) == (0.5, 0.25)
+    assert (figures["false_kept"], figures["right_pruned"]) == (4, 8)
+    assert figures["p99"] == np.inf

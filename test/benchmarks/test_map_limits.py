@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of what is made of closures to tell what limits a trajectory."""
+"""Tests of what is made of closures to find what limits a trajectory."""
 
 from __future__ import annotations
 
@@ -30,40 +30,40 @@ def case() -> Any:
     true = [pose(np.eye(3), np.array([float(x), 0.0, 0.0])) for x in xs]
     frames = [SimpleNamespace(stamp_ns=k * SECOND, T_odom_camera=T) for k, T in enumerate(true)]
     truth = Truth((k * SECOND, T) for k, T in enumerate(true))
-    words = []
+    closures = []
     for a, b in ((0, 20), (1, 19), (5, 15)):
         T = truth.between(a * SECOND, b * SECOND)
         assert T is not None
         wrong = T @ pose(np.eye(3), np.array([0.1, 0.0, 0.0]))
-        words.append(
+        closures.append(
             LoopClosure(from_ns=a * SECOND, to_ns=b * SECOND, T_from_to=wrong, covariance=0.01 * np.eye(6), labels=())
         )
-    return SimpleNamespace(frames=frames, truth=truth, closures=words)
+    return SimpleNamespace(frames=frames, truth=truth, closures=closures)
 
 
 def test_perfect_closures_are_of_the_same_pairs_with_the_same_covariances(case: Any) -> None:
     import map_limits
 
-    for word, other in zip(map_limits.perfect(case, case.frames), case.closures, strict=True):
-        assert (word.from_ns, word.to_ns) == (other.from_ns, other.to_ns)
-        assert np.allclose(word.T_from_to, case.truth.between(word.from_ns, word.to_ns))
-        assert np.array_equal(word.covariance, other.covariance)
+    for closure, other in zip(map_limits.perfect(case, case.frames), case.closures, strict=True):
+        assert (closure.from_ns, closure.to_ns) == (other.from_ns, other.to_ns)
+        assert np.allclose(closure.T_from_to, case.truth.between(closure.from_ns, closure.to_ns))
+        assert np.array_equal(closure.covariance, other.covariance)
 
 
 def test_closures_between_the_same_stretches_share_what_one_knows(case: Any) -> None:
     import map_limits
 
-    near = [word.covariance[0, 0] for word in map_limits.thinned(3.0)(case, case.frames)]
-    alone = [word.covariance[0, 0] for word in map_limits.thinned(0.5)(case, case.frames)]
+    near = [closure.covariance[0, 0] for closure in map_limits.thinned(3.0)(case, case.frames)]
+    alone = [closure.covariance[0, 0] for closure in map_limits.thinned(0.5)(case, case.frames)]
     assert near == pytest.approx([0.02, 0.02, 0.01]) and alone == pytest.approx([0.01] * 3)
 
 
-def test_errors_and_claims_are_told(case: Any) -> None:
+def test_errors_and_claims_are_reported(case: Any) -> None:
     import map_limits
 
-    told = map_limits.consistency(case)
-    assert told["error_cm"] == pytest.approx(10.0) and told["claimed_cm"] == pytest.approx(10.0 * np.sqrt(3))
-    assert told["squared_in_variances"] == pytest.approx(1 / 6)
+    figures = map_limits.consistency(case)
+    assert figures["error_cm"] == pytest.approx(10.0) and figures["claimed_cm"] == pytest.approx(10.0 * np.sqrt(3))
+    assert figures["squared_in_variances"] == pytest.approx(1 / 6)
 
 
 def test_perfect_closures_of_a_walk_leave_nothing_of_its_error(case: Any) -> None:

@@ -30,14 +30,14 @@ def test_a_square_in_the_plane_is_solved_as_well_by_all(tmp_path: Path) -> None:
     file.write_text(SQUARE)
     graph = map_public.read(file)
     assert graph.name == "square" and len(graph.dense.steps) == 3 and len(graph.dense.closures) == 1
-    told = map_public.compare(graph, robust=True)
-    best = told[map_public.LM]["chi2"]
-    assert told[map_public.START]["chi2"] > 2 * best
+    figures = map_public.compare(graph, robust=True)
+    best = figures[map_public.LM]["chi2"]
+    assert figures[map_public.START]["chi2"] > 2 * best
     for name in (map_public.BELIEVED, map_public.ROBUST):
-        assert told[name]["chi2"] == pytest.approx(best, rel=0.02) and told[name]["left_out"] == 0
+        assert figures[name]["chi2"] == pytest.approx(best, rel=0.02) and figures[name]["left_out"] == 0
 
 
-def test_a_node_that_nothing_ties_is_told(tmp_path: Path) -> None:
+def test_a_node_that_nothing_ties_is_reported(tmp_path: Path) -> None:
     import map_public
 
     file = tmp_path / "loose.g2o"

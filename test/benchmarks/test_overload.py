@@ -39,7 +39,7 @@ def test_growth_is_that_after_the_warm_up(overload: ModuleType) -> None:
     assert overload.slope_mb_per_hour(samples, 10.0) == pytest.approx(3600.0)
 
 
-def test_the_books_of_a_node_account_for_every_frame_or_say_how_many_not(overload: ModuleType) -> None:
-    told = {"received": "10", "published": "6", "waiting": "1", "dropped: late": "2", "dropped: unmatched": "1"}
-    assert overload.unaccounted(told) == 0
-    assert overload.unaccounted(told | {"received": "12"}) == 2
+def test_the_counters_of_a_node_account_for_every_frame_or_say_how_many_not(overload: ModuleType) -> None:
+    counters = {"received": "10", "published": "6", "waiting": "1", "dropped: late": "2", "dropped: unmatched": "1"}
+    assert overload.unaccounted(counters) == 0
+    assert overload.unaccounted(counters | {"received": "12"}) == 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of how it is told whether a later session knew where it was."""
+"""Tests of how it is judged whether a later session knew where it was."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def test_only_starts_that_saw_a_known_object_for_long_enough_count_and_false_one
         {"counts": True, "after_s": None, "first": None, "drifted": 0, "answers": 0},
         {"counts": False, "after_s": None, "first": [9.0, 2.0], "drifted": 2, "answers": 2},
     ]
-    told = summary(rows)
-    assert (told["sessions"], told["could"], told["in_time"], told["share"]) == (4, 3, 1, 0.333)
-    assert told["false_sessions"] == 1 and told["drifted"] == 3 and told["median_s"] == 4.0
+    figures = summary(rows)
+    assert (figures["sessions"], figures["could"], figures["in_time"], figures["share"]) == (4, 3, 1, 0.333)
+    assert figures["false_sessions"] == 1 and figures["drifted"] == 3 and figures["median_s"] == 4.0
 
 
 def test_without_recordings_it_says_what_it_needs(tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_each_robot_makes_keyframes_under_its_name(robots: ModuleType) -> None:
     assert sorted(a.keyframe.stamp_ns for a in made) != [] and all(a.keyframe.objects for a in made)
 
 
-def test_a_way_is_told_in_one_line(robots: ModuleType) -> None:
+def test_a_way_is_reported_in_one_line(robots: ModuleType) -> None:
     between = {
         "constraints": 3,
         "false": 1,
@@ -96,9 +96,9 @@ def test_a_way_is_told_in_one_line(robots: ModuleType) -> None:
         "keyframes": {"closed": 4, "of": 30},
     }
     row = {"constraints": 8, "false": 2, "between": between, "map_cm": 4.04, "perfect_ties_cm": None}
-    told = robots.line("seed1 packed", {**row, "alone_cm": {"a": 1.25, "b": None}})
-    assert told.startswith("seed1 packed") and "8 constraints, 2 false; between robots 3 (1 false)" in told
-    assert "stretches 2/9, keyframes 4/30; map 4.0 cm, perfect ties - cm, alone 1.2, - cm" in told
+    line = robots.line("seed1 packed", {**row, "alone_cm": {"a": 1.25, "b": None}})
+    assert line.startswith("seed1 packed") and "8 constraints, 2 false; between robots 3 (1 false)" in line
+    assert "stretches 2/9, keyframes 4/30; map 4.0 cm, perfect ties - cm, alone 1.2, - cm" in line
 
 
 def test_each_its_own_ties_the_robots_and_says_what_it_sent(robots: ModuleType) -> None:

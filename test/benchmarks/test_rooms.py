@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of how it is told whether the right place is found among many rooms."""
+"""Tests of how it is judged whether the right place is found among many rooms."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ DRIFT = pose(rotation_from_vector(np.array([0.0, 0.0, 0.3])), np.array([5.0, 1.0
 SECOND = 1_000_000_000
 
 
-def test_an_object_is_known_where_it_stood_and_a_pose_is_told_by_the_odometry_of_a_moment() -> None:
+def test_an_object_is_known_where_it_stood_and_a_pose_is_given_by_the_odometry_of_a_moment() -> None:
     from sessions import Earlier
 
     truth = Truth((k * SECOND // 10, moved(0.1 * k)) for k in range(11))

@@ -92,7 +92,7 @@ def test_only_losses_must_be_named_and_by_their_own_cause() -> None:
     assert "focal                    3          15       30     1      2     1  depth-scale" in table(judged(rows))
 
 
-def test_the_error_of_a_mount_is_told_where_one_was_estimated() -> None:
+def test_the_error_of_a_mount_is_given_where_one_was_estimated() -> None:
     from stream_cases import mount_error
 
     true = pose(rotation_from_vector(np.array([0.0, 0.0, 0.5])), np.array([0.1, 0.0, 0.0]))

@@ -45,12 +45,12 @@ def test_each_constraint_is_in_common_once(team: ModuleType) -> None:
 
 def test_a_run_is_over_when_every_keyframe_of_every_frame_was_searched_for(team: ModuleType) -> None:
     keyframer = {"received": "9", "waiting": "0", "keyframes sent": "2"}
-    told = {"r1/keyframer": keyframer, "registrar": {"received": "2", "waiting": "0"}}
-    assert team.is_settled(told, {"r1": 9})
-    assert not team.is_settled(told, {"r1": 10})
-    assert not team.is_settled({**told, "registrar": {"received": "1", "waiting": "0"}}, {"r1": 9})
-    assert not team.is_settled({**told, "registrar": {"received": "2", "waiting": "1"}}, {"r1": 9})
-    assert not team.is_settled({**told, "r1/keyframer": {**keyframer, "waiting": "1"}}, {"r1": 9})
+    status = {"r1/keyframer": keyframer, "registrar": {"received": "2", "waiting": "0"}}
+    assert team.is_settled(status, {"r1": 9})
+    assert not team.is_settled(status, {"r1": 10})
+    assert not team.is_settled({**status, "registrar": {"received": "1", "waiting": "0"}}, {"r1": 9})
+    assert not team.is_settled({**status, "registrar": {"received": "2", "waiting": "1"}}, {"r1": 9})
+    assert not team.is_settled({**status, "r1/keyframer": {**keyframer, "waiting": "1"}}, {"r1": 9})
 
 
 def test_trouble_is_a_loss_and_a_pause(team: ModuleType) -> None:

@@ -51,7 +51,7 @@ def test_a_node_has_the_profile_of_its_case_and_none_of_ours(
     assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
 
 
-def test_a_run_is_told_in_a_row_and_one_whose_ends_never_met_too(wireless: ModuleType) -> None:
+def test_a_run_is_reported_in_a_row_and_one_whose_ends_never_met_too(wireless: ModuleType) -> None:
     (case,) = wireless.cases(["rmw_fastrtps_cpp"], ["config/fastdds_wifi.xml"], ["0.2:30"], **REST)
     result = wireless.Result(1.0, 2, 1, 0.123, 4.567, 96.4, 1.6, 1442)
     link = "| rmw_fastrtps_cpp, fastdds_wifi.xml | 20%, pause of 30 s |"
