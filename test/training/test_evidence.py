@@ -23,10 +23,10 @@ def rows(count: int, sensor: str = "kinect_v1") -> Rows:
 
 
 def test_every_scenario_is_seen_by_every_sensor_in_every_rig_in_a_room_of_its_own() -> None:
-    told = plans(100)
-    assert len(told) == len(SCENARIOS) * len(SENSORS) * len(RIGS)
-    assert sorted(one.seed for one in told) == list(range(100, 100 + len(told)))
-    assert len({one.name for one in told}) == len(told)
+    listed = plans(100)
+    assert len(listed) == len(SCENARIOS) * len(SENSORS) * len(RIGS)
+    assert sorted(one.seed for one in listed) == list(range(100, 100 + len(listed)))
+    assert len({one.name for one in listed}) == len(listed)
 
 
 def test_a_row_has_the_error_whether_a_rule_refuses_and_the_readings() -> None:

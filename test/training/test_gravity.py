@@ -14,7 +14,7 @@ def test_the_deviation_of_either_tilt_is_found_in_angles() -> None:
     assert sigma_deg((tilt**2).sum(axis=1)) == pytest.approx(1.7, rel=0.03)
 
 
-def test_views_of_a_simulated_room_tell_gravity_with_a_confidence() -> None:
+def test_views_of_a_simulated_room_give_gravity_with_a_confidence() -> None:
     views = tilts(1, 2)
     confidence, squared = next(views)
     assert 0.0 < confidence <= 1.0 and squared < 25.0

@@ -47,7 +47,7 @@ def test_int8_answers_stay_near_those_in_floats(models: tuple[Path, Path]) -> No
         assert np.corrcoef(floats.ravel(), int8.ravel())[0, 1] > 0.98
 
 
-def test_the_int8_model_is_small_and_takes_pixels_without_a_word_in_floats(models: tuple[Path, Path]) -> None:
+def test_the_int8_model_is_small_and_takes_pixels_without_a_value_in_floats(models: tuple[Path, Path]) -> None:
     model = onnx.load(str(models[1]))
     assert model.graph.input[0].type.tensor_type.elem_type == onnx.TensorProto.UINT8
     assert models[1].stat().st_size < 0.45 * models[0].stat().st_size
