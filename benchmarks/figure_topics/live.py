@@ -112,9 +112,9 @@ TOPICS = (
         name="overload",
         title="One core, four times the camera's speed",
         script="benchmarks/overload.py --speed 4 --cores 1 --seed 0",
-        quick="--seconds 45 --frames 150",
+        quick="--seconds 35 --frames 150",
         whole="--seconds 600",
-        minutes=(1.5, 12),
+        minutes=(1.3, 12),
         rows=(
             Row("frames", "frames that no count accounts for", "{unaccounted}", _overload),
             Row("end", "from SIGINT to the end", "{end_s}", _overload, timed=True),
@@ -131,9 +131,9 @@ TOPICS = (
         name="attacks",
         title="Attacked",
         script="benchmarks/attacks.py --first 0",
-        quick="--seconds 60 --workers 1",
+        quick="--seconds 40 --workers 1",
         whole="--seconds 900",
-        minutes=(2.3, 20),
+        minutes=(1.9, 20),
         rows=(
             Row(
                 "found",

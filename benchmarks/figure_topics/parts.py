@@ -218,9 +218,9 @@ TOPICS = (
         name="batch",
         title="Many recordings over processes",
         script="benchmarks/batch.py --workers 1,2 --keep KEEP",
-        quick="--simulate 4 --frames 40",
+        quick="--simulate 3 --frames 30",
         whole="--simulate 24 --frames 80",
-        minutes=(1.5, 20),
+        minutes=(1.2, 20),
         rows=(
             Row("times", "two workers over one", "{times} × as fast, {recordings} recordings", _batch, timed=True),
             Row("same", "runs, one with a worker that is killed, of the same result", "{same} of {runs}", _batch),
