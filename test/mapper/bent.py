@@ -30,7 +30,7 @@ def square(side: float = 2.0, per_side: int = 20, laps: int = 1) -> list[Array]:
 
 
 def bent(true: list[Array]) -> list[Array]:
-    """The same walk as odometry tells it: a little too long, and turning."""
+    """The same walk as odometry has it: a little too long, and turning."""
     poses = [true[0]]
     for before, after in pairwise(true):
         motion = inverse(before) @ after

@@ -20,8 +20,8 @@ WALK = odometry(square())
 def followed(graph: PoseGraph, robot: str, leaps: list[str] | None = None, frame_id: str = "odom") -> Follower:
     said = [] if leaps is None else leaps
     follower = Follower(robot, 5.0, lambda: said.append(robot))
-    for word in WALK[:20]:
-        for admitted in follower.admit(replace(word, frame_id=frame_id)).poses:
+    for sample in WALK[:20]:
+        for admitted in follower.admit(replace(sample, frame_id=frame_id)).poses:
             follower.follow_pose(admitted, graph)
     return follower
 
@@ -37,12 +37,12 @@ def test_poses_come_into_the_graph_as_those_of_the_robot() -> None:
     assert counts["placed"] == {"a": True, "b": False} and counts["keyframes"]["a"] == keyframes > 5
 
 
-def test_a_pose_that_leaps_is_told_and_one_that_comes_late_is_counted() -> None:
+def test_a_pose_that_leaps_is_reported_and_one_that_comes_late_is_counted() -> None:
     leaps: list[str] = []
     follower = followed(PoseGraph(), "a", leaps)
     away = replace(WALK[20], T_odom_body=pose(np.eye(3), np.array([30.0, 0.0, 0.0])))
-    for word in (away, WALK[21], WALK[15]):
-        follower.admit(word)
+    for sample in (away, WALK[21], WALK[15]):
+        follower.admit(sample)
     assert leaps == ["a"] and follower.passed_over_count == 2
 
 

@@ -74,13 +74,13 @@ class Outside:
 
     def drive(self, poses: list[np.ndarray]) -> None:
         """Odometry in the camera's stead: one message at a time, so that none is lost on the way."""
-        for count, word in enumerate(odometry(poses), start=1):
-            self.odom.publish(to_msg.odometry(word))
+        for count, sample in enumerate(odometry(poses), start=1):
+            self.odom.publish(to_msg.odometry(sample))
             self.wait(lambda count=count: reported(self.node)["odometry"] >= count)
 
     def send(self, closures: list[LoopClosure]) -> None:
-        for word in closures:
-            self.constraints.publish(to_msg.constraint(word))
+        for constraint in closures:
+            self.constraints.publish(to_msg.constraint(constraint))
 
     def settled(self) -> bool:
         balance = self.node.accounting.balance()
@@ -132,7 +132,7 @@ def test_the_correction_carries_odom_to_map(outside: Outside) -> None:
     assert (outside.corrections[-1].header.frame_id, outside.corrections[-1].child_frame_id) == ("map", "odom")
 
 
-def test_a_wrong_constraint_is_pruned_and_told(outside: Outside) -> None:
+def test_a_wrong_constraint_is_pruned_and_reported(outside: Outside) -> None:
     off = pose(rotation_from_vector(np.array([0.0, 0.0, 1.2])), np.array([0.8, 0.6, 0.0]))
     outside.drive(BENT)
     outside.send([*ROUND_TRIP, closure(TRUE, 10, 90, off)])
@@ -168,12 +168,12 @@ def test_odometry_that_begins_anew_elsewhere_is_on_the_map_once_constraints_tie_
     outside.drive(BENT[:HALF])
     outside.wait(lambda: outside.corrections)
     away = pose(np.eye(3), np.array([3.0, 0.0, 0.0]))
-    for count, word in enumerate(walk[HALF:], start=HALF - 1):  # the first two of them are held back
-        outside.odom.publish(to_msg.odometry(replace(word, T_odom_body=away @ word.T_odom_body)))
+    for count, sample in enumerate(walk[HALF:], start=HALF - 1):  # the first two of them are held back
+        outside.odom.publish(to_msg.odometry(replace(sample, T_odom_body=away @ sample.T_odom_body)))
         outside.wait(lambda count=count: reported(outside.node)["odometry"] >= min(count, HALF))
     outside.wait(lambda: reported(outside.node)["odometry"] == len(walk))
-    told = reported(outside.node)
-    assert (told["sessions"], told["placed in the map"]) == (2, False)
+    status = reported(outside.node)
+    assert (status["sessions"], status["placed in the map"]) == (2, False)
     assert headers.stamp_ns(outside.corrections[-1]) < walk[HALF].stamp_ns  # where it is now nobody knows
     outside.send(ROUND_TRIP)
     outside.wait(lambda: reported(outside.node)["placed in the map"] and outside.settled())
@@ -188,16 +188,16 @@ def test_two_publishers_of_odometry_do_not_fill_the_log(outside: Outside, monkey
     monkeypatch.setattr(outside.node, "get_logger", lambda: log)
     monkeypatch.setattr(outside.node, "throttled", ThrottledLog(log.warning))
     away = pose(np.eye(3), np.array([3.0, 0.0, 0.0]))
-    for word in odometry([away @ T if k % 2 else T for k, T in enumerate(BENT[:20])]):
-        outside.node._on_odometry(to_msg.odometry(word))
+    for sample in odometry([away @ T if k % 2 else T for k, T in enumerate(BENT[:20])]):
+        outside.node._on_odometry(to_msg.odometry(sample))
     assert reported(outside.node)["odometry"] == 10
     assert len(said) == 1 and "more than one publisher" in said[0]
 
 
 def test_a_constraint_within_a_gap_of_the_odometry_is_dropped(outside: Outside) -> None:
     outside.drive(BENT[:20])
-    for word in odometry(BENT)[60:62]:
-        outside.odom.publish(to_msg.odometry(word))
+    for sample in odometry(BENT)[60:62]:
+        outside.odom.publish(to_msg.odometry(sample))
     outside.wait(lambda: reported(outside.node)["odometry"] == 22)
     outside.send([closure(TRUE, 5, 40)])
     outside.wait(lambda: outside.node.accounting.balance().dropped == {"odometry_gap": 1})
@@ -283,8 +283,8 @@ def test_one_pose_that_leaps_and_two_stale_ones_leave_the_map(outside: Outside) 
     keyframes = reported(node)["keyframes"]
     away = pose(np.eye(3), np.array([30.0, 0.0, 0.0]))
     outlier = replace(walk[60], T_odom_body=away @ walk[60].T_odom_body)
-    for word in (outlier, walk[61], walk[5], walk[6], walk[62]):
-        outside.odom.publish(to_msg.odometry(word))
+    for sample in (outlier, walk[61], walk[5], walk[6], walk[62]):
+        outside.odom.publish(to_msg.odometry(sample))
     outside.wait(lambda: reported(node)["odometry"] == 62)
     assert reported(node)["odometry passed over"] == 3
     assert reported(node)["keyframes"] >= keyframes and node._graph.keyframes.stamps_ns[0] == 0
@@ -345,7 +345,9 @@ def test_without_odometry_the_oldest_constraints_make_room(outside: Outside) -> 
     outside.send(ROUND_TRIP[:3])
     outside.wait(lambda: outside.node.accounting.balance().received == 3)
     assert outside.node.accounting.balance().dropped == {"queue_full": 1}
-    assert [word.to_ns for word in outside.node._waiting.closures] == [word.to_ns for word in ROUND_TRIP[1:3]]
+    assert [constraint.to_ns for constraint in outside.node._waiting.closures] == [
+        constraint.to_ns for constraint in ROUND_TRIP[1:3]
+    ]
 
 
 def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
@@ -367,10 +369,10 @@ def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
 def test_after_a_reset_the_same_constraints_are_of_the_new_map(outside: Outside) -> None:
     node = outside.node
     for _ in range(2):
-        for word in odometry(BENT):
-            node._on_odometry(to_msg.odometry(word))
-        for word in ROUND_TRIP:
-            node._closures._on_constraint(to_msg.constraint(word))
+        for sample in odometry(BENT):
+            node._on_odometry(to_msg.odometry(sample))
+        for constraint in ROUND_TRIP:
+            node._closures._on_constraint(to_msg.constraint(constraint))
         outside.wait(lambda: reported(node)["constraints kept"] == len(ROUND_TRIP))
         outside.wait(outside.settled)
         assert node._reset(None, Trigger.Response()).success
@@ -395,8 +397,8 @@ def test_a_saved_map_is_gone_on_with(outside: Outside) -> None:
     outside.node._inputs = outside.node._inputs.replaced(resume=True)
     resumed = outside.node._resumed()
     outside.node._begin(resumed)
-    told = reported(outside.node)
-    assert (told["sessions"], told["placed in the map"], told["constraints kept"]) == (1, False, len(ROUND_TRIP))
+    status = reported(outside.node)
+    assert (status["sessions"], status["placed in the map"], status["constraints kept"]) == (1, False, len(ROUND_TRIP))
 
 
 def test_a_stamp_that_repeats_is_passed_over(outside: Outside) -> None:
@@ -423,9 +425,9 @@ def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(
 ) -> None:
     monkeypatch.setattr("objreg_ros.bridge.streams.map_announcements.TransformBroadcaster", Broadcaster)
     broadcaster = outside.node._out._broadcaster = Broadcaster(outside.node)
-    for word in odometry(BENT[:3]):
-        outside.node._on_odometry(to_msg.odometry(word))
-        outside.node._on_odometry(to_msg.odometry(replace(word, stamp_ns=word.stamp_ns - 1000)))
+    for sample in odometry(BENT[:3]):
+        outside.node._on_odometry(to_msg.odometry(sample))
+        outside.node._on_odometry(to_msg.odometry(replace(sample, stamp_ns=sample.stamp_ns - 1000)))
     assert [headers.stamp_ns(message) for message in broadcaster.sent] == [w.stamp_ns for w in odometry(BENT[:3])]
     assert {(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent} == {("map", "odom")}
 

@@ -37,8 +37,8 @@ WALKS = {"a": odometry(LAPS["a"]), "b": odometry([ELSEWHERE @ T for T in LAPS["b
 
 def met(a: int, b: int) -> LoopClosure:
     """What the one robot saw at its step and the other at its own."""
-    told = replace(closure(TRUE, a, HALF + b), from_ns=a * SECOND // 10, to_ns=b * SECOND // 10)
-    return replace(told, from_robot="fleet/a", to_robot="fleet/b", from_session=0, to_session=0)
+    closed = replace(closure(TRUE, a, HALF + b), from_ns=a * SECOND // 10, to_ns=b * SECOND // 10)
+    return replace(closed, from_robot="fleet/a", to_robot="fleet/b", from_session=0, to_session=0)
 
 
 class Fleet:
@@ -59,8 +59,8 @@ class Fleet:
         self.executor.add_node(self.node)
         self.executor.add_node(self.peer)
         topics = {publisher.topic_name for publisher in self.odom.values()}
-        heard_of = [one for one in self.node.subscriptions if one.topic_name in topics]
-        self.wait(lambda: len(heard_of) == 2 and all(one.get_publisher_count() for one in heard_of))
+        subscriptions = [one for one in self.node.subscriptions if one.topic_name in topics]
+        self.wait(lambda: len(subscriptions) == 2 and all(one.get_publisher_count() for one in subscriptions))
         self.wait(lambda: all(publisher.get_subscription_count() for publisher in self.odom.values()))
 
     def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
@@ -69,7 +69,7 @@ class Fleet:
             assert time.monotonic() < end, f"nothing came; known is {by_key(*self.node.own_diagnostics())}"
             self.executor.spin_once(timeout_sec=0.05)
 
-    def told(self, robot: str, key: str) -> Any:
+    def diagnostic(self, robot: str, key: str) -> Any:
         return by_key(*self.node.own_diagnostics())[f"fleet/{robot}: {key}"]
 
     def drive(self, steps: range) -> None:
@@ -77,12 +77,12 @@ class Fleet:
         for k in steps:
             for robot, walk in WALKS.items():
                 self.odom[robot].publish(to_msg.odometry(replace(walk[k], frame_id=f"{robot}/odom")))
-        self.wait(lambda: all(self.told(robot, "odometry") == steps.stop for robot in "ab"))
+        self.wait(lambda: all(self.diagnostic(robot, "odometry") == steps.stop for robot in "ab"))
 
-    def close(self, word: LoopClosure) -> None:
-        """As a closure that objreg_msgs tells, which need not be installed."""
-        self.node.accept(word.to_ns)
-        self.node._take(word)
+    def close(self, known: LoopClosure) -> None:
+        """As a closure of objreg_msgs, which need not be installed."""
+        self.node.accept(known.to_ns)
+        self.node._take(known)
 
 
 @pytest.fixture
@@ -100,15 +100,15 @@ def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Fleet]:
 
 def test_each_robot_has_its_path_and_correction_once_closures_tie_it_to_the_first(fleet: Fleet) -> None:
     fleet.drive(range(HALF))
-    fleet.wait(lambda: fleet.paths["a"] and len(fleet.paths["a"][-1].poses) == fleet.told("a", "keyframes"))
-    assert (fleet.told("a", "placed in the map"), fleet.told("b", "placed in the map")) == (True, False)
+    fleet.wait(lambda: fleet.paths["a"] and len(fleet.paths["a"][-1].poses) == fleet.diagnostic("a", "keyframes"))
+    assert (fleet.diagnostic("a", "placed in the map"), fleet.diagnostic("b", "placed in the map")) == (True, False)
     assert not fleet.corrections["b"] and not any(path.poses for path in fleet.paths["b"])
     for a, b in ((40, 10), (20, 20), (70, 72)):
         fleet.close(met(a, b))
     fleet.wait(lambda: fleet.corrections["b"] and fleet.paths["b"] and fleet.paths["b"][-1].poses)
     fleet.wait(lambda: by_key(*fleet.node.own_diagnostics())["constraints kept"] == 3)
     fleet.wait(lambda: fleet.node.accounting.balance().waiting == 0)
-    frames = {robot: (told[-1].header.frame_id, told[-1].child_frame_id) for robot, told in fleet.corrections.items()}
+    frames = {robot: (sent[-1].header.frame_id, sent[-1].child_frame_id) for robot, sent in fleet.corrections.items()}
     assert frames == {"a": ("map", "a/odom"), "b": ("map", "b/odom")}
 
     def end() -> np.ndarray:
@@ -119,11 +119,11 @@ def test_each_robot_has_its_path_and_correction_once_closures_tie_it_to_the_firs
 
 def test_a_robot_whose_time_jumps_back_begins_a_session_and_leaves_the_other_alone(fleet: Fleet) -> None:
     fleet.drive(range(40))
-    keyframes = fleet.told("a", "keyframes")
-    for word in WALKS["b"][:3]:
-        fleet.node._on_odometry(to_msg.odometry(word), "fleet/b")
-    assert (fleet.told("b", "keyframes"), fleet.told("a", "keyframes")) == (1, keyframes)
-    assert by_key(*fleet.node.own_diagnostics())["sessions"] == 3 and fleet.told("a", "odometry passed over") == 0
+    keyframes = fleet.diagnostic("a", "keyframes")
+    for sample in WALKS["b"][:3]:
+        fleet.node._on_odometry(to_msg.odometry(sample), "fleet/b")
+    assert (fleet.diagnostic("b", "keyframes"), fleet.diagnostic("a", "keyframes")) == (1, keyframes)
+    assert by_key(*fleet.node.own_diagnostics())["sessions"] == 3 and fleet.diagnostic("a", "odometry passed over") == 0
 
 
 def test_a_closure_of_a_robot_that_is_not_named_is_dropped(fleet: Fleet) -> None:
@@ -141,9 +141,9 @@ def test_frames_of_one_name_are_not_broadcast_and_that_is_said_once(
     monkeypatch.setattr(fleet.node, "get_logger", lambda: SimpleNamespace(warning=said.append))
     for k in range(4):
         for robot, frame in (("a", "odom"), ("b", "odom" if k else "b/odom")):
-            word = replace(WALKS[robot][k], frame_id=frame)
-            fleet.node._on_odometry(to_msg.odometry(word), f"fleet/{robot}")
-    assert [message.child_frame_id for message in broadcaster.sent] == ["odom", "odom"]  # until b tells the same
+            sample = replace(WALKS[robot][k], frame_id=frame)
+            fleet.node._on_odometry(to_msg.odometry(sample), f"fleet/{robot}")
+    assert [message.child_frame_id for message in broadcaster.sent] == ["odom", "odom"]  # until b names the same
     assert len(said) == 1 and "two robots publish their odometry in 'odom'" in said[0]
 
 
@@ -151,12 +151,12 @@ def test_a_saved_map_is_gone_on_with_by_both(fleet: Fleet) -> None:
     fleet.drive(range(HALF))
     for a, b in ((40, 10), (20, 20)):
         fleet.close(met(a, b))
-    fleet.wait(lambda: fleet.told("b", "placed in the map"))
+    fleet.wait(lambda: fleet.diagnostic("b", "placed in the map"))
     assert fleet.node._save()[0]
     fleet.node._inputs = fleet.node._inputs.replaced(resume=True)
     fleet.node._begin(fleet.node._resumed())
     assert [one.robot for one in fleet.node._graph.sessions] == ["fleet/a", "fleet/b"]
-    assert (fleet.told("a", "placed in the map"), fleet.told("b", "placed in the map")) == (False, False)
+    assert (fleet.diagnostic("a", "placed in the map"), fleet.diagnostic("b", "placed in the map")) == (False, False)
     for robot in "ab":
         later = replace(WALKS[robot][0], stamp_ns=1000 * SECOND)
         fleet.node._followers[f"fleet/{robot}"].believe_next(5.0)

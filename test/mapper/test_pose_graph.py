@@ -194,26 +194,26 @@ def test_a_closure_of_two_runs_of_the_clock_is_refused(to: int) -> None:
 
 def test_a_closure_within_a_gap_of_the_odometry_ties_nothing() -> None:
     graph, silent = PoseGraph(), range(100, 130)
-    for k, word in enumerate(odometry(TRUE)):
+    for k, sample in enumerate(odometry(TRUE)):
         if k not in silent:
-            graph.add_odometry(word)
+            graph.add_odometry(sample)
     inside = closure(TRUE, 10, 110)
     assert graph.in_gap(inside) and not graph.add_closure(inside)
     assert not graph.in_gap(RIGHT[0]) and graph.add_closure(RIGHT[0])
 
 
 def test_odometry_that_began_anew_elsewhere_in_a_silence_gives_way_to_closures() -> None:
-    """The second lap is told from another origin, as by an odometry that was started again beside the old one."""
+    """The second lap is given from another origin, as by an odometry that was started again beside the old one."""
     again = pose(rotation_from_vector(np.array([0.0, 0.0, 0.3])), np.array([1.0, -0.5, 0.0]))
-    late = [replace(word, stamp_ns=word.stamp_ns + 20 * SECOND) for word in odometry([again @ T for T in TRUE])]
+    late = [replace(sample, stamp_ns=sample.stamp_ns + 20 * SECOND) for sample in odometry([again @ T for T in TRUE])]
     graph = PoseGraph()
-    for word in (*odometry(TRUE)[:HALF], *late[HALF:]):
-        graph.add_odometry(word)
+    for sample in (*odometry(TRUE)[:HALF], *late[HALF:]):
+        graph.add_odometry(sample)
     for right in RIGHT[1:]:
         assert graph.add_closure(replace(right, to_ns=right.to_ns + 20 * SECOND))
     summary = graph.optimise()
     assert not summary.pruned
-    found = graph.corrected([word.stamp_ns for word in late[HALF + 5 :]])
+    found = graph.corrected([sample.stamp_ns for sample in late[HALF + 5 :]])
     assert distances(found, TRUE[HALF + 5 :]).max() < 0.02
 
 
@@ -255,7 +255,7 @@ def test_a_turn_on_the_spot_becomes_a_keyframe_by_its_degrees() -> None:
     graph = PoseGraph(MapperParams(keyframe_rotation=15.0))
     turns = (0.0, 14.0, 16.0, 30.0, 32.0)
     poses = [pose(rotation_from_vector(np.radians([0.0, 0.0, turn])), np.zeros(3)) for turn in turns]
-    assert [graph.add_odometry(word) for word in odometry(poses)] == [True, False, True, False, True]
+    assert [graph.add_odometry(sample) for sample in odometry(poses)] == [True, False, True, False, True]
 
 
 def test_time_that_runs_back_is_refused() -> None:
@@ -284,12 +284,12 @@ def test_closures_that_are_a_little_wrong_one_way_are_no_evidence_of_a_steady_er
 
 def test_between_keyframes_the_correction_goes_over_from_the_one_to_the_other() -> None:
     graph = PoseGraph(MapperParams(keyframe_translation=1.0))
-    for word in odometry([pose(np.eye(3), np.array([0.25 * k, 0.0, 0.0])) for k in range(9)]):
-        graph.add_odometry(word)
+    for sample in odometry([pose(np.eye(3), np.array([0.25 * k, 0.0, 0.0])) for k in range(9)]):
+        graph.add_odometry(sample)
     aside = np.array([pose(np.eye(3), np.array([x, y, 0.0])) for x, y in ((0.0, 0.0), (1.0, 0.1), (2.0, 0.4))])
     chain = Chain.begun(np.eye(4), Steady()).extended(np.array(graph.keyframes.poses), np.full((2, 2), 1e-4))
-    course = SolvedTrajectory(chain, (0, 1, 2), aside)
-    graph.adopt_solution(graph.problem(), Solution((course,), np.zeros(0, bool), np.zeros(0)))
+    trajectory = SolvedTrajectory(chain, (0, 1, 2), aside)
+    graph.adopt_solution(graph.problem(), Solution((trajectory,), np.zeros(0, bool), np.zeros(0)))
     found = [T[:2, 3] for T in graph.corrected(o.stamp_ns for o in odometry([np.eye(4)] * 9))]
     expected = [0.0, 0.025, 0.05, 0.075, 0.1, 0.175, 0.25, 0.325, 0.4]
     np.testing.assert_allclose(found, [(0.25 * k, y) for k, y in enumerate(expected)], atol=1e-9)
@@ -317,7 +317,7 @@ def test_a_withdrawn_closure_is_in_no_map_and_no_summary_any_more() -> None:
     clean, graph = mapped(RIGHT), mapped([slightly, *RIGHT])
     clean.optimise()
     assert slightly in graph.optimise().kept
-    assert graph.withdraw(lambda word: word is slightly) == 1 and graph.withdraw(lambda word: word is slightly) == 0
+    assert graph.withdraw(lambda known: known is slightly) == 1 and graph.withdraw(lambda known: known is slightly) == 0
     summary = graph.optimise()
     assert slightly not in (*summary.kept, *summary.pruned) and len(summary.kept) == len(RIGHT)
     assert slightly not in [tie.closure for tie in graph.ties] and len(graph.closure_ties) == len(RIGHT)
@@ -333,29 +333,29 @@ LAPS = TRUE[:HALF], TRUE[HALF:]
 def two_sessions(second: int | None = 2) -> PoseGraph:
     """A lap, and the same lap again by the same clock and from another origin."""
     graph = PoseGraph()
-    for word in odometry(LAPS[0]):
-        graph.add_odometry(word)
+    for sample in odometry(LAPS[0]):
+        graph.add_odometry(sample)
     graph.begin_session(second)
-    for word in odometry([ELSEWHERE @ T for T in LAPS[1]]):
-        graph.add_odometry(word)
+    for sample in odometry([ELSEWHERE @ T for T in LAPS[1]]):
+        graph.add_odometry(sample)
     return graph
 
 
 def across(a: int, b: int, sessions: tuple[int | None, int | None] = (1, 2)) -> LoopClosure:
     """A perfect closure of a step of the first lap and one of the second."""
     moments = {"from_ns": a * SECOND // 10, "to_ns": b * SECOND // 10}
-    told = replace(closure(TRUE, a, HALF + b), **moments)
-    return replace(told, from_session=sessions[0], to_session=sessions[1])
+    closed = replace(closure(TRUE, a, HALF + b), **moments)
+    return replace(closed, from_session=sessions[0], to_session=sessions[1])
 
 
-def test_two_runs_of_one_clock_are_told_apart_by_their_sessions() -> None:
+def test_two_runs_of_one_clock_are_distinguished_by_their_sessions() -> None:
     graph = two_sessions()
     for a, b in ((40, 10), (20, 21), (70, 72)):
         assert graph.add_closure(across(a, b))
     summary = graph.optimise()
     assert len(summary.kept) == 3 and graph.is_placed
     assert [one.names for one in graph.sessions] == [{1}, {2}]
-    found = graph.corrected(word.stamp_ns for word in odometry(LAPS[1]))
+    found = graph.corrected(sample.stamp_ns for sample in odometry(LAPS[1]))
     assert distances(found, LAPS[1]).max() < 0.03
 
 
@@ -387,12 +387,12 @@ def test_a_closure_that_is_refused_names_no_session() -> None:
 
 def test_a_moment_that_the_run_of_now_has_yet_to_come_to_is_not_that_of_the_run_before() -> None:
     graph = PoseGraph()
-    for word in odometry(LAPS[0]):
-        graph.add_odometry(word)
+    for sample in odometry(LAPS[0]):
+        graph.add_odometry(sample)
     assert graph.add_closure(replace(closure(TRUE, 5, 30), from_session=1, to_session=1))
     graph.begin_session()
-    for word in odometry([ELSEWHERE @ T for T in LAPS[1][:20]]):
-        graph.add_odometry(word)
+    for sample in odometry([ELSEWHERE @ T for T in LAPS[1][:20]]):
+        graph.add_odometry(sample)
     early = replace(closure(TRUE, 3, 40), from_session=2, to_session=2)
     assert not graph.add_closure(early)
     with pytest.raises(ValueError, match="names its sessions"):
@@ -429,14 +429,14 @@ def test_a_session_that_one_closure_ties_waits_for_another() -> None:
 
 def test_sessions_by_different_clocks_need_no_names() -> None:
     graph = PoseGraph()
-    for word in odometry(LAPS[0]):
-        graph.add_odometry(word)
+    for sample in odometry(LAPS[0]):
+        graph.add_odometry(sample)
     graph.begin_session()
-    for k, word in enumerate(odometry([ELSEWHERE @ T for T in LAPS[1]])):
-        graph.add_odometry(replace(word, stamp_ns=(HALF + k) * SECOND // 10 + SECOND))
+    for k, sample in enumerate(odometry([ELSEWHERE @ T for T in LAPS[1]])):
+        graph.add_odometry(replace(sample, stamp_ns=(HALF + k) * SECOND // 10 + SECOND))
     for a, b in ((20, 101), (60, 141)):
-        told = closure(TRUE, a, b)
-        assert graph.add_closure(replace(told, to_ns=told.to_ns + SECOND))
+        closed = closure(TRUE, a, b)
+        assert graph.add_closure(replace(closed, to_ns=closed.to_ns + SECOND))
     assert len(graph.optimise().kept) == 2 and graph.is_placed
 
 
@@ -456,8 +456,8 @@ def test_a_session_of_no_odometry_is_none() -> None:
     graph = PoseGraph()
     graph.begin_session(3)
     assert [one.names for one in graph.sessions] == [{3}] and graph.is_placed
-    for word in odometry(LAPS[0]):
-        graph.add_odometry(word)
+    for sample in odometry(LAPS[0]):
+        graph.add_odometry(sample)
     graph.begin_session(4)
     graph.begin_session(5)
     assert [one.names for one in graph.sessions] == [{3}, {5}] and not graph.is_placed

@@ -25,22 +25,22 @@ TRUE = square(laps=2)
 HALF = len(TRUE) // 2
 LAPS = {"a": TRUE[:HALF], "b": TRUE[HALF : 2 * HALF]}
 ELSEWHERE = pose(rotation_from_vector(np.array([0.0, 0.0, 0.7])), np.array([5.0, -3.0, 0.0]))
-TOLD = {"a": odometry(LAPS["a"]), "b": odometry([ELSEWHERE @ T for T in LAPS["b"]])}
+ODOMETRY = {"a": odometry(LAPS["a"]), "b": odometry([ELSEWHERE @ T for T in LAPS["b"]])}
 
 
 def driven(*robots: str) -> PoseGraph:
     """All walk by the same clock, pose by pose in turn, each from an origin of its own."""
     graph = PoseGraph()
-    for words in zip(*(TOLD["a" if robot == "a" else "b"] for robot in robots), strict=True):
-        for robot, word in zip(robots, words, strict=True):
-            graph.add_odometry(word, robot)
+    for samples in zip(*(ODOMETRY["a" if robot == "a" else "b"] for robot in robots), strict=True):
+        for robot, sample in zip(robots, samples, strict=True):
+            graph.add_odometry(sample, robot)
     return graph
 
 
 def met(a: int, b: int, robots: tuple[str, str] = ("a", "b"), error: Array | None = None) -> LoopClosure:
     """A perfect closure of a step of robot a and one of robot b, or one that is off by ``error``."""
-    told = replace(closure(TRUE, a, HALF + b, error), from_ns=a * SECOND // 10, to_ns=b * SECOND // 10)
-    return replace(told, from_robot=robots[0], to_robot=robots[1])
+    closed = replace(closure(TRUE, a, HALF + b, error), from_ns=a * SECOND // 10, to_ns=b * SECOND // 10)
+    return replace(closed, from_robot=robots[0], to_robot=robots[1])
 
 
 def test_a_robot_is_in_the_map_of_the_first_once_two_closures_agree_on_where() -> None:
@@ -51,7 +51,7 @@ def test_a_robot_is_in_the_map_of_the_first_once_two_closures_agree_on_where() -
         placed.append(graph.T_map_odom_of("b") is not None)
     assert placed == [False, True, True] and graph.T_map_odom_of("a") is not None
     for robot in ("a", "b"):
-        found = graph.corrected((word.stamp_ns for word in TOLD[robot]), robot)
+        found = graph.corrected((sample.stamp_ns for sample in ODOMETRY[robot]), robot)
         assert distances(found, LAPS[robot]).max() < 0.03
         assert [T for _, T in graph.path(robot)][-1] == pytest.approx(found[-1], abs=0.3)
 
@@ -61,7 +61,7 @@ def test_the_map_is_that_of_the_robot_whose_odometry_came_first() -> None:
     for a, b in ((40, 10), (20, 21)):
         assert graph.add_closure(met(a, b))
     graph.optimise()
-    found = graph.corrected((word.stamp_ns for word in TOLD["a"]), "a")
+    found = graph.corrected((sample.stamp_ns for sample in ODOMETRY["a"]), "a")
     assert distances(found, [ELSEWHERE @ T for T in LAPS["a"]]).max() < 0.03
     assert [session.robot for session in graph.sessions] == ["b", "a"]
 
@@ -86,7 +86,7 @@ def test_a_robot_is_in_the_map_by_way_of_another() -> None:
     for a, b in ((40, 10), (20, 20)):
         assert graph.add_closure(met(a, b))
     graph.optimise()
-    assert distances(graph.corrected((word.stamp_ns for word in TOLD["b"]), "c"), LAPS["b"]).max() < 0.05
+    assert distances(graph.corrected((sample.stamp_ns for sample in ODOMETRY["b"]), "c"), LAPS["b"]).max() < 0.05
 
 
 def test_a_robot_leaves_the_map_with_the_closures_that_placed_it() -> None:
@@ -115,8 +115,8 @@ def test_a_closure_that_names_no_robot_where_two_may_be_meant_is_refused() -> No
 
 def test_a_closure_of_whatever_robot_is_taken_where_odometry_has_no_name_but_not_one_of_two() -> None:
     graph = PoseGraph()
-    for word in odometry(TRUE):
-        graph.add_odometry(word)
+    for sample in odometry(TRUE):
+        graph.add_odometry(sample)
     assert graph.add_closure(replace(closure(TRUE, 10, 90), from_robot="x", to_robot="x"))
     with pytest.raises(UnknownRobotError, match="got one of 'x' and 'y'"):
         graph.add_closure(replace(closure(TRUE, 20, 100), from_robot="x", to_robot="y"))
@@ -124,12 +124,12 @@ def test_a_closure_of_whatever_robot_is_taken_where_odometry_has_no_name_but_not
 
 def test_a_closure_waits_for_the_robot_that_is_behind() -> None:
     graph = PoseGraph()
-    for word in TOLD["a"]:
-        graph.add_odometry(word, "a")
+    for sample in ODOMETRY["a"]:
+        graph.add_odometry(sample, "a")
     early = met(60, 10)
     assert not graph.add_closure(early) and not graph.in_gap(early) and not graph.is_before_odometry(early)
-    for word in TOLD["b"][:11]:
-        graph.add_odometry(word, "b")
+    for sample in ODOMETRY["b"][:11]:
+        graph.add_odometry(sample, "b")
     assert graph.add_closure(early)
 
 
@@ -144,7 +144,7 @@ def test_each_closure_is_between_bodies_by_where_its_cameras_sit_on_their_robots
         T = inverse(mounts["a"]) @ of_bodies.T_from_to @ mounts["b"]
         assert graph.add_closure(replace(of_bodies, T_from_to=T), lambda robot, _: mounts[robot])
     assert len(graph.optimise().kept) == 3
-    assert distances(graph.corrected((word.stamp_ns for word in TOLD["b"]), "b"), LAPS["b"]).max() < 0.05
+    assert distances(graph.corrected((sample.stamp_ns for sample in ODOMETRY["b"]), "b"), LAPS["b"]).max() < 0.05
 
 
 def test_another_day_each_robot_goes_on_in_the_map_that_was_saved(tmp_path: Path) -> None:
@@ -158,14 +158,14 @@ def test_another_day_each_robot_goes_on_in_the_map_that_was_saved(tmp_path: Path
     assert [tie.closure.robots for tie in today.closure_ties if tie.closure] == [("a", "b")] * 2
     today.optimise()
     later_ns = 86_400 * SECOND
-    for word in TOLD["b"]:
-        today.add_odometry(replace(word, stamp_ns=word.stamp_ns + later_ns), "b")
+    for sample in ODOMETRY["b"]:
+        today.add_odometry(replace(sample, stamp_ns=sample.stamp_ns + later_ns), "b")
     for a, b in ((30, 31), (50, 52)):
         again = replace(met(a, b), from_session=3, to_session=9)
         assert today.add_closure(replace(again, to_ns=again.to_ns + later_ns))
     today.optimise()
     assert [session.robot for session in today.sessions] == ["a", "b", "b"] and today.T_map_odom_of("a") is None
-    found = today.corrected((word.stamp_ns + later_ns for word in TOLD["b"]), "b")
+    found = today.corrected((sample.stamp_ns + later_ns for sample in ODOMETRY["b"]), "b")
     assert distances(found, LAPS["b"]).max() < 0.05
 
 
@@ -187,14 +187,14 @@ def meetings(one: Walk, other: Walk, false_share: float, rng: np.random.Generato
         error = pose(rotation_from_vector(rng.normal(0, sigmas[1], 3)), rng.normal(0, sigmas[0], 3))
         T_from_to = inverse(one.T_world_body[a]) @ other.T_world_body[b] @ error
         covariance = np.diag(np.square(np.repeat([0.02, 0.01], 3)))
-        told = {
+        fields = {
             "from_ns": a * PERIOD_NS,
             "to_ns": b * PERIOD_NS,
             "from_robot": "a",
             "to_robot": "b",
             "labels": ("cup",),
         }
-        found.append(LoopClosure(T_from_to=T_from_to, covariance=covariance, **told))
+        found.append(LoopClosure(T_from_to=T_from_to, covariance=covariance, **fields))
     return found
 
 
@@ -205,19 +205,19 @@ def errors_m(seed: int, false_share: float) -> tuple[float, float]:
     for robot, of in walks.items():
         alone[robot] = PoseGraph()
         moved = [
-            replace(word, T_odom_body=(ELSEWHERE if robot == "b" else np.eye(4)) @ word.T_odom_body)
-            for word in of.odometry
+            replace(sample, T_odom_body=(ELSEWHERE if robot == "b" else np.eye(4)) @ sample.T_odom_body)
+            for sample in of.odometry
         ]
-        for word in moved:
-            graph.add_odometry(word, robot)
-            alone[robot].add_odometry(word)
-        for told in of.closures:
-            graph.add_closure(replace(told, from_robot=robot, to_robot=robot))
-            alone[robot].add_closure(told)
-    for told in meetings(walks["a"], walks["b"], false_share, np.random.default_rng(seed)):
-        graph.add_closure(told)
+        for sample in moved:
+            graph.add_odometry(sample, robot)
+            alone[robot].add_odometry(sample)
+        for closed in of.closures:
+            graph.add_closure(replace(closed, from_robot=robot, to_robot=robot))
+            alone[robot].add_closure(closed)
+    for closed in meetings(walks["a"], walks["b"], false_share, np.random.default_rng(seed)):
+        graph.add_closure(closed)
     graph.optimise()
-    stamps = {robot: [word.stamp_ns for word in of.odometry] for robot, of in walks.items()}
+    stamps = {robot: [sample.stamp_ns for sample in of.odometry] for robot, of in walks.items()}
     together = [T for robot in walks for T in graph.corrected(stamps[robot], robot)]
     truth = [T for of in walks.values() for T in of.T_world_body]
     apart = []

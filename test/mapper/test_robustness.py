@@ -38,15 +38,15 @@ FALSE = 0.3  # of all closures
 def corrected(odometry: Sequence[Odometry], closures: Iterable[LoopClosure]) -> list[Array]:
     """The poses of the map at the moments of odometry; closures that the graph refuses are left out."""
     graph = PoseGraph()
-    for word in odometry:
-        graph.add_odometry(word)
-    for closure_word in closures:
+    for sample in odometry:
+        graph.add_odometry(sample)
+    for known in closures:
         try:
-            graph.add_closure(closure_word)
+            graph.add_closure(known)
         except ValueError as error:
             assert "expected" in str(error)
     graph.optimise()
-    return graph.corrected(word.stamp_ns for word in odometry)
+    return graph.corrected(sample.stamp_ns for sample in odometry)
 
 
 def error_m(closures: list[LoopClosure]) -> float:
@@ -54,8 +54,8 @@ def error_m(closures: list[LoopClosure]) -> float:
     return float(np.sqrt(np.mean(distances(corrected(WALK, closures), TRUE) ** 2)))
 
 
-def sure(word: LoopClosure, sigma: float) -> LoopClosure:
-    return replace(word, covariance=sigma**2 * np.eye(6))
+def sure(known: LoopClosure, sigma: float) -> LoopClosure:
+    return replace(known, covariance=sigma**2 * np.eye(6))
 
 
 def off(metres: float, degrees: float = 0.0) -> Array:
@@ -78,7 +78,7 @@ def test_false_closures_that_claim_a_micrometre_leave_the_map(false_count: int, 
         a = int(rng.integers(0, HALF))
         b = int(rng.integers(a + 20, len(TRUE)))
         false.append(closure(TRUE, a, b, off(rng.uniform(0.3, 3.0), rng.uniform(-60.0, 60.0))))
-    claimed = [sure(word, 1e-6) for word in [*RIGHT, *false]]
+    claimed = [sure(known, 1e-6) for known in [*RIGHT, *false]]
     assert error_m(claimed) == pytest.approx(error_m(RIGHT), abs=NEAR_M)
 
 
@@ -113,7 +113,7 @@ def harm(seed: int) -> float:
 
 @pytest.mark.slow
 def test_a_third_of_lies_hardly_ever_harms_a_map() -> None:
-    """Of 300 graphs 17 were harmed by 1.3 times and one by twice: by lies too small for odometry to tell."""
+    """Of 300 graphs 17 were harmed by 1.3 times and one by twice: by lies too small for odometry to show."""
     harms = np.array([harm(seed) for seed in range(GRAPHS)])
     harmed = f"harmed: {np.flatnonzero(harms > 1.3).tolist()}"
     assert np.median(harms) <= 1.02, harmed

@@ -30,8 +30,8 @@ ELSEWHERE = pose(rotation_from_vector(np.array([0.0, 0.0, 0.7])), np.array([3.0,
 @pytest.fixture
 def yesterday() -> PoseGraph:
     graph = PoseGraph()
-    for word in odometry(BENT):
-        graph.add_odometry(word)
+    for sample in odometry(BENT):
+        graph.add_odometry(sample)
     for k in range(3, HALF, 13):
         assert graph.add_closure(replace(closure(TRUE, k, k + HALF), from_session=7, to_session=7))
     graph.optimise()
@@ -59,8 +59,8 @@ def test_the_next_day_goes_on_in_the_map_once_two_closures_agree_on_where(yester
     saved.save(saved.packed(yesterday), tmp_path / "map.npz")
     today = saved.load(tmp_path / "map.npz", MapperParams())
     late = [replace(w, stamp_ns=w.stamp_ns + LATER_NS, T_odom_body=ELSEWHERE @ w.T_odom_body) for w in odometry(BENT)]
-    for word in late:
-        today.add_odometry(word)
+    for sample in late:
+        today.add_odometry(sample)
     placed = []
     for k in (5, 15, 35, 55):
         assert today.add_closure(again(k, k + 4))
@@ -126,14 +126,14 @@ def test_a_file_with_a_wrong_byte_is_refused_or_the_same_map(yesterday: PoseGrap
 
 def changed(arrays: dict[str, np.ndarray], change: Callable[[dict[str, Any]], object]) -> dict[str, np.ndarray]:
     """The arrays of a map whose text was changed."""
-    told = json.loads(arrays["told"].tobytes())
-    change(told)
-    return arrays | {"told": np.frombuffer(json.dumps(told).encode(), np.uint8)}
+    header = json.loads(arrays["told"].tobytes())
+    change(header)
+    return arrays | {"told": np.frombuffer(json.dumps(header).encode(), np.uint8)}
 
 
 @pytest.mark.parametrize("stamp", [np.inf, -np.inf, np.nan, 1e300, 2**70, -(2**70), "1", None, True])
 def test_a_stamp_that_no_clock_has_is_refused(yesterday: PoseGraph, tmp_path: Path, stamp: object) -> None:
-    arrays = changed(saved.packed(yesterday), lambda told: told["closures"][0].update(from_ns=stamp))
+    arrays = changed(saved.packed(yesterday), lambda header: header["closures"][0].update(from_ns=stamp))
     saved.save(arrays, tmp_path / "map.npz")
     with pytest.raises(ValueError, match="expected a map that ~/save wrote"):
         saved.load(tmp_path / "map.npz", MapperParams())
@@ -149,7 +149,7 @@ def test_stamps_of_odometry_that_no_message_holds_are_refused(yesterday: PoseGra
 
 
 def test_a_map_without_some_of_its_closures_is_refused(yesterday: PoseGraph, tmp_path: Path) -> None:
-    saved.save(changed(saved.packed(yesterday), lambda told: told["closures"].pop()), tmp_path / "map.npz")
+    saved.save(changed(saved.packed(yesterday), lambda header: header["closures"].pop()), tmp_path / "map.npz")
     with pytest.raises(ValueError, match=r"expected 5 closures everywhere, got .*'ends': 6"):
         saved.load(tmp_path / "map.npz", MapperParams())
 
@@ -178,15 +178,15 @@ def test_a_map_of_complex_numbers_is_refused(yesterday: PoseGraph, tmp_path: Pat
 
 def test_a_map_of_before_robots_is_of_one_without_a_name(yesterday: PoseGraph, tmp_path: Path) -> None:
     arrays = saved.packed(yesterday)
-    told = json.loads(arrays["told"].tobytes())
-    del told["robots"]
-    for known in told["closures"]:
+    header = json.loads(arrays["told"].tobytes())
+    del header["robots"]
+    for known in header["closures"]:
         del known["from_robot"], known["to_robot"]
-    arrays["told"] = np.frombuffer(json.dumps(told | {"version": 1}).encode(), np.uint8)
+    arrays["told"] = np.frombuffer(json.dumps(header | {"version": 1}).encode(), np.uint8)
     saved.save(arrays, tmp_path / "map.npz")
     found = saved.load(tmp_path / "map.npz", MapperParams())
     assert [one.robot for one in found.sessions] == [""] and found.closure_ties[0].closure.robots == ("", "")
-    arrays["told"] = np.frombuffer(json.dumps(told | {"version": 3}).encode(), np.uint8)
+    arrays["told"] = np.frombuffer(json.dumps(header | {"version": 3}).encode(), np.uint8)
     saved.save(arrays, tmp_path / "map.npz")
     with pytest.raises(ValueError, match="version: expected 1 or 2, got 3"):
         saved.load(tmp_path / "map.npz", MapperParams())

@@ -20,8 +20,8 @@ def driven(*runs: tuple[str, int, int]) -> Sessions:
     sessions = Sessions()
     for robot, first, last in runs:
         sessions.begin_session(robot=robot)
-        for word in WALK[first:last]:
-            sessions[-1].add_pose(word, MapperParams())
+        for sample in WALK[first:last]:
+            sessions[-1].add_pose(sample, MapperParams())
     return sessions
 
 
@@ -74,12 +74,12 @@ def test_a_moment_that_another_robot_may_have_is_not_lost_in_a_gap_of_the_first(
 
 
 def test_the_ends_of_a_closure_have_each_their_robot_and_session() -> None:
-    told = replace(closure(square(), 1, 2), from_robot="a", to_robot="b", from_session=3, to_session=4)
-    assert moments_of(told) == (at("a", 1, 3), at("b", 2, 4))
+    closed = replace(closure(square(), 1, 2), from_robot="a", to_robot="b", from_session=3, to_session=4)
+    assert moments_of(closed) == (at("a", 1, 3), at("b", 2, 4))
 
 
 def test_what_is_known_of_a_closure_names_sessions_of_both_robots() -> None:
     sessions = driven(("a", 0, 50), ("b", 0, 50))
-    told = replace(closure(square(), 1, 2), from_robot="a", to_robot="b", from_session=3, to_session=4)
-    sessions.learn_from(told)
+    closed = replace(closure(square(), 1, 2), from_robot="a", to_robot="b", from_session=3, to_session=4)
+    sessions.learn_from(closed)
     assert [one.names for one in sessions] == [{3}, {4}]

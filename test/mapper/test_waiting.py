@@ -26,19 +26,19 @@ def driven(
     """A graph, what waits for it, and the bodies that a camera was looked for on."""
     graph, bodies = PoseGraph(), list[str]()
     followers = Followers({robot: Follower(robot, 5.0, lambda: None) for robot in robots})
-    for word in (odometry(TRUE)[k] for k in steps):
+    for sample in (odometry(TRUE)[k] for k in steps):
         for robot, follower in followers.items():
-            follower.follow_pose(replace(word, child_frame_id=f"{robot}/base"), graph)
+            follower.follow_pose(replace(sample, child_frame_id=f"{robot}/base"), graph)
 
-    def find_mount(words: list, frame_id: str) -> Array | None:
-        bodies.append(words[0].child_frame_id)
+    def find_mount(samples: list, frame_id: str) -> Array | None:
+        bodies.append(samples[0].child_frame_id)
         return None
 
     return graph, ClosureQueue(followers, find_mount, most=2), bodies
 
 
-def of(told: LoopClosure, one: str, other: str) -> LoopClosure:
-    return replace(told, from_robot=one, to_robot=other)
+def of(closed: LoopClosure, one: str, other: str) -> LoopClosure:
+    return replace(closed, from_robot=one, to_robot=other)
 
 
 def test_a_closure_whose_odometry_is_there_is_tied_by_the_bodies_of_its_robots() -> None:
@@ -49,7 +49,7 @@ def test_a_closure_whose_odometry_is_there_is_tied_by_the_bodies_of_its_robots()
 
 
 @pytest.mark.parametrize(
-    ("told", "reason"),
+    ("refused", "reason"),
     [
         (closure(TRUE, 10, 5), "two_clocks"),
         (closure(TRUE, 10, 90, pose(np.eye(3), np.array([50.0, 0.0, 0.0]))), "implausible"),
@@ -57,9 +57,9 @@ def test_a_closure_whose_odometry_is_there_is_tied_by_the_bodies_of_its_robots()
         (of(closure(TRUE, 10, 90), "x", "y"), "unknown_robot"),
     ],
 )
-def test_a_closure_that_cannot_be_used_is_refused_by_reason(told: LoopClosure, reason: str) -> None:
+def test_a_closure_that_cannot_be_used_is_refused_by_reason(refused: LoopClosure, reason: str) -> None:
     graph, waiting, _ = driven()
-    waiting.closures = [told]
+    waiting.closures = [refused]
     assert [fate.reason for fate in waiting.tie(graph)] == [reason] and not graph.closure_ties
 
 
@@ -83,9 +83,9 @@ def test_closures_wait_until_too_many_do() -> None:
 def test_a_camera_is_looked_for_under_the_prefix_of_its_robot_where_the_body_has_it(prefix: str, asked: str) -> None:
     graph, frames = PoseGraph(), list[str]()
     followers = Followers({"a": Follower("a", 5.0, lambda: None)})
-    for word in odometry(TRUE):
-        followers["a"].follow_pose(replace(word, child_frame_id=f"{prefix}base"), graph)
-    waiting = ClosureQueue(followers, lambda words, frame_id: frames.append(frame_id), most=2)
-    told = replace(of(closure(TRUE, 10, 90), "a", "a"), from_frame_id="a/camera", to_frame_id="a/camera")
-    waiting.closures = [told]
+    for sample in odometry(TRUE):
+        followers["a"].follow_pose(replace(sample, child_frame_id=f"{prefix}base"), graph)
+    waiting = ClosureQueue(followers, lambda samples, frame_id: frames.append(frame_id), most=2)
+    closed = replace(of(closure(TRUE, 10, 90), "a", "a"), from_frame_id="a/camera", to_frame_id="a/camera")
+    waiting.closures = [closed]
     assert [fate.reason for fate in waiting.tie(graph)] == [""] and set(frames) == {asked}

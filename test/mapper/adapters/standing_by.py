@@ -65,13 +65,15 @@ class Around:
             self.constraints.publish(to_msg.constraint(one))
 
     def drive(self, node: Adapter, first_s: float, last_s: float, step_s: float = 0.5) -> None:
-        """Odometry along the walk; it waits until the last word has been received."""
+        """Odometry along the walk; it waits until the last message has been received."""
         self.wait(self.odom.get_subscription_count)
         stamps = np.arange(first_s, last_s + step_s / 2, step_s)
         for seconds in stamps:
-            word = Odometry(T_odom_body=body_at(seconds), stamp_ns=round(seconds * SECOND), child_frame_id="base_link")
-            self.odom.publish(to_msg.odometry(word))
-            self.wait(partial(_has_heard, node, word.stamp_ns))
+            sample = Odometry(
+                T_odom_body=body_at(seconds), stamp_ns=round(seconds * SECOND), child_frame_id="base_link"
+            )
+            self.odom.publish(to_msg.odometry(sample))
+            self.wait(partial(_has_received, node, sample.stamp_ns))
 
     def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
         end = time.monotonic() + seconds
@@ -92,7 +94,7 @@ class Around:
         self.node.destroy_node()
 
 
-def _has_heard(node: Any, stamp_ns: int) -> bool:
+def _has_received(node: Any, stamp_ns: int) -> bool:
     newest = node._odom.newest
     return newest is not None and newest.stamp_ns >= stamp_ns
 
@@ -100,5 +102,5 @@ def _has_heard(node: Any, stamp_ns: int) -> bool:
 def begin(monkeypatch: pytest.MonkeyPatch, *parameters: str) -> None:
     """ROS with parameters for every node, on this machine only."""
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    given = [word for one in parameters for word in ("-p", one)]
+    given = [argument for one in parameters for argument in ("-p", one)]
     rclpy.init(args=["--ros-args", *given] if given else [])

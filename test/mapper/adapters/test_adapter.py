@@ -33,7 +33,7 @@ class MessagesByStamp(Adapter):
         return self.is_open
 
 
-def tell_whole(graph: Around, one: LoopClosure, retracted: bool = False) -> None:
+def publish_whole(graph: Around, one: LoopClosure, retracted: bool = False) -> None:
     if graph.whole is None:
         pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
     message = closures_msg.loop_closure(one)
@@ -44,16 +44,16 @@ def tell_whole(graph: Around, one: LoopClosure, retracted: bool = False) -> None
 def test_a_constraint_that_comes_by_both_topics_is_taken_once(around: Callable[..., Any]) -> None:
     graph = around()
     node = graph.start(MessagesByStamp)
-    tell_whole(graph, closure())
+    publish_whole(graph, closure())
     graph.send(closure(), closure())
     graph.wait(lambda: node.has and by_key(*node.own_diagnostics())["repeated"] == 2)
     assert len(node.has) == 1 and node.accounting.balance().published == 1
 
 
 @pytest.mark.parametrize(("topic", "count"), [("loop_closures", 1), ("constraints", 2)])
-def test_one_topic_is_heard_where_one_is_named(around: Callable[..., Any], topic: str, count: int) -> None:
+def test_one_topic_is_received_where_one_is_named(around: Callable[..., Any], topic: str, count: int) -> None:
     graph = around(f"input:={topic}")
-    tell_whole(graph, closure())
+    publish_whole(graph, closure())
     graph.send(closure(2.0), closure(3.0))
     node = graph.start(MessagesByStamp)
     graph.wait(lambda: len(node.has) == count)
@@ -96,17 +96,17 @@ def test_what_waits_is_bounded_and_goes_once_the_consumer_is_there(around: Calla
     assert [from_ns for _, from_ns, _, _ in node.has] == [2_000_000_000, 3_000_000_000]
 
 
-def test_what_is_withdrawn_while_it_waits_never_goes_and_later_it_is_told(around: Callable[..., Any]) -> None:
+def test_what_is_withdrawn_while_it_waits_never_goes_and_later_it_is_reported(around: Callable[..., Any]) -> None:
     graph = around()
     node = graph.start(MessagesByStamp)
     node.is_open = False
-    tell_whole(graph, closure(1.0))
-    tell_whole(graph, closure(1.0), retracted=True)
+    publish_whole(graph, closure(1.0))
+    publish_whole(graph, closure(1.0), retracted=True)
     graph.wait(lambda: node.accounting.balance().dropped == {"retracted": 1})
     node.is_open = True
-    tell_whole(graph, closure(2.0))
+    publish_whole(graph, closure(2.0))
     graph.wait(lambda: len(node.has) == 1)
-    tell_whole(graph, closure(2.0), retracted=True)
+    publish_whole(graph, closure(2.0), retracted=True)
     graph.wait(lambda: by_key(*node.own_diagnostics())["retracted too late"] == 1)
 
 

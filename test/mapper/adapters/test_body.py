@@ -44,14 +44,14 @@ def test_nothing_is_assumed_of_frames_that_nobody_ties(around: Callable[..., Any
     assert "expected to know where 'camera' sits on 'base_link'" in said[0] and "set T_base_camera" in said[0]
 
 
-def test_tf_static_says_it_for_the_body_that_odometry_speaks_of(around: Callable[..., Any]) -> None:
+def test_tf_static_says_it_for_the_body_that_odometry_is_of(around: Callable[..., Any]) -> None:
     if transforms.TFMessage is None:
         pytest.skip("tf2_msgs is not installed")
     graph = around()
     where = made(graph)
-    teller = graph.node.create_publisher(transforms.TFMessage, "/tf_static", qos.latched())
-    teller.publish(transforms.TFMessage(transforms=[to_msg.transform(AHEAD, 0, "hull", "camera")]))
-    word = Odometry(T_odom_body=np.eye(4), stamp_ns=0, child_frame_id="hull")
-    graph.wait(lambda: where.of(closure(), word) is not None)
-    np.testing.assert_allclose(where.of(closure(), word), AHEAD, atol=1e-9)
+    publisher = graph.node.create_publisher(transforms.TFMessage, "/tf_static", qos.latched())
+    publisher.publish(transforms.TFMessage(transforms=[to_msg.transform(AHEAD, 0, "hull", "camera")]))
+    sample = Odometry(T_odom_body=np.eye(4), stamp_ns=0, child_frame_id="hull")
+    graph.wait(lambda: where.of(closure(), sample) is not None)
+    np.testing.assert_allclose(where.of(closure(), sample), AHEAD, atol=1e-9)
     assert where.of(closure()) is None  # of base_link nothing is known

@@ -37,9 +37,9 @@ def test_odometry_and_constraints_are_in_the_file_number_by_number(around: Calla
     np.testing.assert_allclose(float(vertices[3][2]), body_at(1.5)[0, 3], atol=1e-9)
     ((k1, k2, *numbers),) = edges(path)
     assert (k1, k2) == (3, 18)  # odometry has a pose at either moment
-    told = pose(rotation_from_quaternion(np.array(numbers[3:7])), np.array(numbers[:3]))
+    written = pose(rotation_from_quaternion(np.array(numbers[3:7])), np.array(numbers[:3]))
     expected = compensated(Constraint(MEASURED, COVARIANCE), AHEAD, inverse(AHEAD))
-    np.testing.assert_allclose(told, expected.T_from_to, atol=1e-8)
+    np.testing.assert_allclose(written, expected.T_from_to, atol=1e-8)
     information = local_information(expected)[np.triu_indices(6)]
     np.testing.assert_allclose(numbers[7:], information, rtol=1e-7, atol=1e-4)
     assert node.accounting.balance().published == 1 and not list(tmp_path.glob(".*.part"))
@@ -75,8 +75,8 @@ def test_odometry_that_begins_anew_begins_another_file(around: Callable[..., Any
     graph.drive(node, 50.0, 53.0)
     before = (tmp_path / "graph.g2o").read_text() if (tmp_path / "graph.g2o").exists() else ""
     for seconds in (1.0, 1.5, 2.0, 2.5, 3.0):
-        word = Odometry(T_odom_body=body_at(seconds), stamp_ns=round(seconds * 1e9), child_frame_id="base_link")
-        graph.odom.publish(to_msg.odometry(word))
+        sample = Odometry(T_odom_body=body_at(seconds), stamp_ns=round(seconds * 1e9), child_frame_id="base_link")
+        graph.odom.publish(to_msg.odometry(sample))
     graph.wait(lambda: (tmp_path / "graph_1.g2o").exists())
     assert (tmp_path / "graph.g2o").read_text().startswith(before) and node.path.name == "graph_1.g2o"
 

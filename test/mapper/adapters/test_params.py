@@ -10,8 +10,8 @@ from objreg_mapper.adapters.params import AdapterParams, BodyParams, ToHydraPara
 
 def test_a_mounting_is_a_pose_or_none() -> None:
     assert BodyParams().mounting is None
-    told = BodyParams(T_base_camera=(0.2, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0)).mounting
-    assert told is not None and told[:3, 3].tolist() == [0.2, 0.0, 0.5]
+    mounting = BodyParams(T_base_camera=(0.2, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0)).mounting
+    assert mounting is not None and mounting[:3, 3].tolist() == [0.2, 0.0, 0.5]
 
 
 @pytest.mark.parametrize(

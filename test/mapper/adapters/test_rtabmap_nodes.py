@@ -32,14 +32,14 @@ def node(number: int, stamp: float, T: Array | None = None, map_id: int = 0, wei
     return SimpleNamespace(id=number, stamp=stamp, map_id=map_id, weight=weight, pose=placed)
 
 
-def told(*nodes: Any) -> RtabmapNodes:
+def nodes_of(*nodes: Any) -> RtabmapNodes:
     made = RtabmapNodes()
     made.add_map_data(SimpleNamespace(nodes=nodes))
     return made
 
 
 def walk(*stamps: int) -> RtabmapNodes:
-    return told(*(node(k + 1, float(stamp), body_at(stamp)) for k, stamp in enumerate(stamps)))
+    return nodes_of(*(node(k + 1, float(stamp), body_at(stamp)) for k, stamp in enumerate(stamps)))
 
 
 def closure(from_s: float, to_s: float) -> LoopClosure:
@@ -64,8 +64,8 @@ def test_between_nodes_the_nodes_own_odometry_leads_there_and_costs_certainty() 
     assert np.linalg.eigvalsh(constraint.covariance).min() > 1e-4
 
 
-def test_odometry_that_covers_the_ways_counts_more_than_what_nodes_tell() -> None:
-    nodes = told(node(1, 1.0, np.eye(4)), node(2, 61.0, np.eye(4)))  # as if the body had not moved
+def test_odometry_that_covers_the_ways_counts_more_than_what_nodes_say() -> None:
+    nodes = nodes_of(node(1, 1.0, np.eye(4)), node(2, 61.0, np.eye(4)))  # as if the body had not moved
     odometry = SparseTrajectory()
     for tenth in range(800):
         odometry.append(tenth * SECOND // 10, body_at(tenth / 10))
@@ -78,14 +78,14 @@ def test_odometry_that_was_silent_on_the_way_leads_nowhere() -> None:
     odometry = SparseTrajectory()
     for tenth in (*range(10), *range(25, 800)):  # it may have begun anew between 0.9 and 2.5 s
         odometry.append(tenth * SECOND // 10, body_at(tenth / 10))
-    nodes = told(node(1, 0.8, body_at(0.8)), node(2, 61.0, body_at(61), map_id=1))
+    nodes = nodes_of(node(1, 0.8, body_at(0.8)), node(2, 61.0, body_at(61), map_id=1))
     assert nodes.tied(closure(0.7, 60.8), odometry, np.eye(4)) is not None
     assert nodes.tied(closure(2.6, 60.8), odometry, np.eye(4)) is None
 
 
 @pytest.mark.parametrize("last_map", [0, 1])
 def test_no_way_leads_past_the_newest_node_or_from_one_map_to_another(last_map: int) -> None:
-    nodes = told(node(1, 1.0, body_at(1)), node(2, 61.0, body_at(61)), node(3, 62.0, body_at(62), map_id=last_map))
+    nodes = nodes_of(node(1, 1.0, body_at(1)), node(2, 61.0, body_at(61)), node(3, 62.0, body_at(62), map_id=last_map))
     assert (nodes.tied(closure(1.0, 61.4), SparseTrajectory(), np.eye(4)) is None) == bool(last_map)
     assert nodes.tied(closure(1.0, 62.4), SparseTrajectory(), np.eye(4)) is None
 
@@ -97,19 +97,19 @@ def test_a_number_with_another_stamp_is_of_another_database() -> None:
 
 
 def test_intermediate_nodes_landmarks_and_nodes_without_odometry_are_left_out() -> None:
-    assert len(told(node(1, 1.0, np.eye(4)), node(2, 2.0, np.eye(4), weight=-1), node(3, 3.0), node(-4, 4.0))) == 1
+    assert len(nodes_of(node(1, 1.0, np.eye(4)), node(2, 2.0, np.eye(4), weight=-1), node(3, 3.0), node(-4, 4.0))) == 1
 
 
 @pytest.mark.parametrize("stamp", [float("nan"), float("inf"), -1.0, 1e12])
 def test_a_stamp_that_is_none_is_refused(stamp: float) -> None:
     with pytest.raises(ValueError, match="mapData: expected a stamp"):
-        told(node(1, stamp, np.eye(4)))
+        nodes_of(node(1, stamp, np.eye(4)))
 
 
 @pytest.mark.parametrize("metres", [float("nan"), float("inf"), 1e9])
 def test_a_pose_that_is_none_is_refused(metres: float) -> None:
     with pytest.raises(ValueError, match="mapData: expected a pose within"):
-        told(node(1, 1.0, pose(np.eye(3), np.array([0.0, metres, 0.0]))))
+        nodes_of(node(1, 1.0, pose(np.eye(3), np.array([0.0, metres, 0.0]))))
 
 
 def test_without_nodes_there_is_none_that_is_nearest() -> None:

@@ -26,10 +26,10 @@ def environment(folder: Path) -> dict[str, str]:
 def test_a_node_starts_or_says_what_to_install_and_ends_with_a_signal(name: str, tmp_path: Path) -> None:
     if find_spec("rclpy") is None:
         pytest.skip("rclpy is not installed")
-    words = [sys.executable, "-m", f"objreg_mapper.adapters.{name}", "--ros-args", "-p", "silence:=5.0"]
+    command = [sys.executable, "-m", f"objreg_mapper.adapters.{name}", "--ros-args", "-p", "silence:=5.0"]
     if name == "g2o":
-        words += ["-p", f"graph_path:={tmp_path}/graph.g2o"]
-    node = subprocess.Popen(words, env=environment(tmp_path), stderr=subprocess.PIPE, text=True)
+        command += ["-p", f"graph_path:={tmp_path}/graph.g2o"]
+    node = subprocess.Popen(command, env=environment(tmp_path), stderr=subprocess.PIPE, text=True)
     needed = MODULES[name]
     if needed and find_spec(needed) is None:
         _, said = node.communicate(timeout=START_S)
@@ -37,7 +37,7 @@ def test_a_node_starts_or_says_what_to_install_and_ends_with_a_signal(name: str,
         return
     assert node.stderr is not None
     line = ""
-    while "Fast DDS" not in line and "check yourself" not in line:  # its first word, once it spins
+    while "Fast DDS" not in line and "check yourself" not in line:  # its first line, once it spins
         line = node.stderr.readline()
         assert line, "it ended by itself"
     node.send_signal(signal.SIGTERM)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""LIO-SAM is told two moments."""
+"""LIO-SAM is given two moments."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def row(count: int = 6) -> IncrementalGraph:
 
 
 def test_two_measurements_meet_where_their_information_says() -> None:
-    """The weighted optimum of two conflicting poses far from the identity: it tells the frame of the information."""
+    """The weighted optimum of two conflicting poses far from the identity: it shows the frame of the information."""
     rng = np.random.default_rng(0)
     T_first = pose(rotation_from_vector(np.array([0.4, -1.1, 0.9])), np.array([1.0, -2.0, 0.5]))
     T_second = T_first @ pose(rotation_from_vector(0.01 * rng.normal(size=3)), 0.01 * rng.normal(size=3))

@@ -55,7 +55,7 @@ def test_a_closure_costs_more_where_the_map_knows_better() -> None:
 
 
 @pytest.mark.parametrize("gone", [[1], [2, 3]])
-def test_what_the_rest_costs_less_is_told(gone: list[int]) -> None:
+def test_what_the_rest_costs_less_is_given(gone: list[int]) -> None:
     inside = [edge(0, 9, 0.01), edge(3, 11, 0.1), edge(2, 10, -0.05), edge(2, 9, -0.04)]
     graph, poses = solved(inside)
     stated = Influence.of(graph, poses, joined(inside), list(range(4))).relief(gone)

@@ -51,9 +51,9 @@ def closed(params: MapperParams, *ties: Tie) -> KeyframeGraph:
 
 
 def test_the_ends_of_closures_are_nodes_and_stay_where_all_agrees() -> None:
-    course = closed(PLAIN, tie(2, 9), tie(4, 9)).trajectory(0)
-    assert {0, 2, 4, 9} <= {*course.nodes} and len(course) == len(ONE.keyframes)
-    np.testing.assert_allclose(course.of(), ONE.keyframes.poses, atol=1e-6)
+    trajectory = closed(PLAIN, tie(2, 9), tie(4, 9)).trajectory(0)
+    assert {0, 2, 4, 9} <= {*trajectory.nodes} and len(trajectory) == len(ONE.keyframes)
+    np.testing.assert_allclose(trajectory.of(), ONE.keyframes.poses, atol=1e-6)
 
 
 def test_closures_of_a_keyframe_share_the_error_of_what_it_saw() -> None:

@@ -128,20 +128,20 @@ def test_closures_between_other_sessions_say_nothing_of_these() -> None:
 
 
 def test_a_map_with_it_leaves_out_lies_and_is_as_one_without_where_there_are_none() -> None:
-    words = walk(WalkParams(poses=120, closures=20, false_share=0.2, lie_m=(0.5, 3.0)), 5)
+    walked = walk(WalkParams(poses=120, closures=20, false_share=0.2, lie_m=(0.5, 3.0)), 5)
     graphs = {}
     for switched in (False, True):
         graph = PoseGraph(MapperParams(pairwise_consistency=switched))
-        for odometry in words.odometry:
+        for odometry in walked.odometry:
             graph.add_odometry(odometry)
-        for k, (closure, false) in enumerate(zip(words.closures, words.is_false.tolist(), strict=True)):
+        for k, (closure, false) in enumerate(zip(walked.closures, walked.is_false.tolist(), strict=True)):
             if switched or not false:
                 graph.add_closure(closure)
             if k % 5 == 0:
                 graph.optimise()
         graph.optimise()
         graphs[switched] = graph
-    lies = {closure.to_ns for closure, false in zip(words.closures, words.is_false, strict=True) if false}
+    lies = {closure.to_ns for closure, false in zip(walked.closures, walked.is_false, strict=True) if false}
     assert lies and lies <= {closure.to_ns for closure in graphs[True].optimise().pruned}
     apart = [
         np.linalg.norm(a[:3, 3] - b[:3, 3]) for (_, a), (_, b) in zip(*(g.path() for g in graphs.values()), strict=True)

@@ -34,8 +34,8 @@ PLAIN = MapperParams(steady_heading=0.0, steady_distance=0.0)
 
 def session(poses: Sequence[Array], params: MapperParams = PLAIN) -> Session:
     made = Session()
-    for word in odometry(list(poses)):
-        made.add_pose(word, params)
+    for sample in odometry(list(poses)):
+        made.add_pose(sample, params)
     return made
 
 
@@ -49,7 +49,7 @@ def tie(
 
 
 def truly(known: Session, true: Sequence[Array]) -> list[Array]:
-    """The true poses of the keyframes of a session whose odometry told one every tenth of a second."""
+    """The true poses of the keyframes of a session whose odometry gave one every tenth of a second."""
     return [true[stamp // 100_000_000] for stamp in known.keyframes.stamps_ns]
 
 
@@ -79,11 +79,11 @@ RIGHT = [within(k, k + LAP) for k in range(1, LAP - 2, 3)]
 
 def test_the_keyframes_that_closures_hold_are_nodes_and_the_others_follow_them() -> None:
     solution = solved([ONE], RIGHT)
-    (course,) = solution.trajectories
-    assert course is not None and solution.kept.all()
+    (trajectory,) = solution.trajectories
+    assert trajectory is not None and solution.kept.all()
     held = {end.keyframe for one in RIGHT for end in (one.end1, one.end2)}
-    assert held <= {*course.nodes} and len(course.nodes) < len(ONE.keyframes) == len(course)
-    assert distances(list(course.of()), TRUE).max() < 0.25 * distances(ONE.keyframes.poses, TRUE).max()
+    assert held <= {*trajectory.nodes} and len(trajectory.nodes) < len(ONE.keyframes) == len(trajectory)
+    assert distances(list(trajectory.of()), TRUE).max() < 0.25 * distances(ONE.keyframes.poses, TRUE).max()
 
 
 def test_closures_that_come_one_by_one_make_the_map_that_all_at_once_do() -> None:
@@ -107,9 +107,9 @@ def test_no_session_at_all_is_a_map_of_nothing() -> None:
 
 
 def test_one_keyframe_stays_where_it_is() -> None:
-    (course,) = solved([session([ELSEWHERE])], []).trajectories
-    assert course is not None
-    np.testing.assert_allclose(course.of(), [ELSEWHERE], atol=1e-9)
+    (trajectory,) = solved([session([ELSEWHERE])], []).trajectories
+    assert trajectory is not None
+    np.testing.assert_allclose(trajectory.of(), [ELSEWHERE], atol=1e-9)
 
 
 def test_a_residual_counts_standard_deviations_and_that_of_a_lie_is_large() -> None:
@@ -123,10 +123,10 @@ def test_a_withdrawn_closure_is_as_one_that_never_came() -> None:
     assert problem(solver, [ONE], bad).solve().kept.all()
     gone = problem(solver, [ONE], bad, withdrawn=frozenset({0})).solve()
     again = problem(solver, [ONE], bad, withdrawn=frozenset({0})).solve()
-    (without,), (course,) = solved([ONE], RIGHT).trajectories, again.trajectories
+    (without,), (trajectory,) = solved([ONE], RIGHT).trajectories, again.trajectories
     assert not gone.kept[0] and not again.kept[0] and again.kept[1:].all()
-    assert without is not None and course is not None
-    assert distances(list(course.of()), list(without.of())).max() < 5e-3
+    assert without is not None and trajectory is not None
+    assert distances(list(trajectory.of()), list(without.of())).max() < 5e-3
 
 
 def test_other_parameters_make_the_map_anew() -> None:
@@ -159,16 +159,16 @@ def test_one_closure_ties_no_session_and_two_that_agree_do() -> None:
 
 
 def test_two_closures_that_disagree_tie_no_session_until_another_agrees_with_one() -> None:
-    solver, told = Solver(), [across(8, 8, SIDEWAYS), across(3, 4)]
-    assert problem(solver, TWO, told).solve().trajectories[1] is None
-    solution = problem(solver, TWO, [*told, across(14, 15)]).solve()
+    solver, ties = Solver(), [across(8, 8, SIDEWAYS), across(3, 4)]
+    assert problem(solver, TWO, ties).solve().trajectories[1] is None
+    solution = problem(solver, TWO, [*ties, across(14, 15)]).solve()
     assert solution.trajectories[1] is not None and solution.kept.tolist() == [False, True, True]
     assert distances(list(solution.trajectories[1].of()), TRUE_TWO[1]).max() < 0.02
 
 
 def test_what_ties_a_session_is_withdrawn_before_it_did() -> None:
-    told = [across(3, 4), across(12, 13)]
-    solution = problem(Solver(), TWO, told, withdrawn=frozenset({1})).solve()
+    ties = [across(3, 4), across(12, 13)]
+    solution = problem(Solver(), TWO, ties, withdrawn=frozenset({1})).solve()
     assert solution.trajectories[1] is None and np.isnan(solution.residuals[0])
 
 
@@ -201,8 +201,8 @@ def test_odometry_that_is_right_is_left_alone() -> None:
     straight = session(LAPS)
     true = truly(straight, LAPS)
     ties = [tie([straight], End(0, k), End(0, k + 12), (true[k], true[k + 12])) for k in range(0, 40, 4)]
-    (course,) = solved([straight], ties, MapperParams()).trajectories
-    assert course is not None and course.chain.steady == Steady()
+    (trajectory,) = solved([straight], ties, MapperParams()).trajectories
+    assert trajectory is not None and trajectory.chain.steady == Steady()
 
 
 # Closures on which GTSAM fails
@@ -214,11 +214,11 @@ def raised_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a method of the graph raise once an edge has the translation of the poison."""
     method, bad = getattr(IncrementalGraph, name), within(*POISON, SIDEWAYS).constraint.T_from_to[:3, 3]
 
-    def failing(graph: IncrementalGraph, *words: Any) -> Any:
-        for edges in (word for word in words if isinstance(word, Edges)):
+    def failing(graph: IncrementalGraph, *arguments: Any) -> Any:
+        for edges in (argument for argument in arguments if isinstance(argument, Edges)):
             if np.isclose(edges.T_1_2[:, :3, 3], bad).all(axis=1).any():
                 raise RuntimeError("no solution")
-        return method(graph, *words)
+        return method(graph, *arguments)
 
     monkeypatch.setattr(IncrementalGraph, name, failing)
 
@@ -227,9 +227,9 @@ def raised_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_closure_on_which_gtsam_raises_is_left_out(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     raised_for(name, monkeypatch)
     clean, solver = solved([ONE], RIGHT), Solver()
-    told = [*RIGHT[:2], within(*POISON, SIDEWAYS), *RIGHT[2:]]
+    ties = [*RIGHT[:2], within(*POISON, SIDEWAYS), *RIGHT[2:]]
     for _ in range(2):
-        solution = problem(solver, [ONE], told).solve()
+        solution = problem(solver, [ONE], ties).solve()
         assert solution.kept.tolist() == [True, True, False] + [True] * (len(RIGHT) - 2)
     assert solution.trajectories[0] is not None and clean.trajectories[0] is not None
     assert distances(list(solution.trajectories[0].of()), list(clean.trajectories[0].of())).max() < 5e-3

@@ -16,8 +16,8 @@ BLOCKS, NUMBERS = 2000, 4000  # of 32 kB, which come from the heap
 
 def resident_mb() -> float:
     """What of this process is in memory."""
-    words = Path("/proc/self/status").read_text().split("VmRSS:")[1].split()
-    return int(words[0]) / 1e3
+    fields = Path("/proc/self/status").read_text().split("VmRSS:")[1].split()
+    return int(fields[0]) / 1e3
 
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="not the GNU C library")

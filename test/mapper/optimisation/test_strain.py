@@ -34,9 +34,9 @@ def lies(count: int, metres: float) -> list[LoopClosure]:
     return [closure(TRUE, k, k + LAP, pose(np.eye(3), shift)) for k, shift in zip(first, moved, strict=True)]
 
 
-def mapped(told: list[Array], closures: list[LoopClosure], params: MapperParams) -> tuple[PoseGraph, MapSummary]:
+def mapped(poses: list[Array], closures: list[LoopClosure], params: MapperParams) -> tuple[PoseGraph, MapSummary]:
     graph = PoseGraph(params)
-    for one in odometry(told):
+    for one in odometry(poses):
         graph.add_odometry(one)
     for one in closures:
         assert graph.add_closure(one)
