@@ -264,7 +264,7 @@ def test_time_that_runs_back_is_refused() -> None:
         graph.add_odometry(odometry(BENT)[0])
 
 
-def test_what_closures_tell_of_odometry_holds_where_nothing_closes() -> None:
+def test_what_closures_say_of_odometry_holds_where_nothing_closes() -> None:
     early = [closure(TRUE, k, k + 30) for k in range(0, 40, 8)]
     plain = mapped(early, MapperParams(steady_heading=0.0, steady_distance=0.0))
     knowing = mapped(early, MapperParams(steady_heading=2.0))
@@ -360,7 +360,7 @@ def test_two_runs_of_one_clock_are_distinguished_by_their_sessions() -> None:
 
 
 @pytest.mark.parametrize(("sessions", "second"), [((None, None), 2), ((1, 2), None)])
-def test_two_runs_of_one_clock_that_nothing_tells_apart_are_refused(
+def test_two_runs_of_one_clock_that_nothing_distinguishes_are_refused(
     sessions: tuple[int | None, int | None], second: int | None
 ) -> None:
     graph = two_sessions(second)
@@ -369,7 +369,7 @@ def test_two_runs_of_one_clock_that_nothing_tells_apart_are_refused(
     assert not graph.closure_ties
 
 
-def test_a_registrar_that_begins_a_session_where_odometry_goes_on_is_heard_all_the_same() -> None:
+def test_a_registrar_that_begins_a_session_where_odometry_goes_on_is_followed_all_the_same() -> None:
     graph = mapped([])
     names = (0, 0), (0, 1), (1, 1)
     for k, (one, other) in enumerate(names):

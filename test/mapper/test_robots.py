@@ -99,7 +99,7 @@ def test_a_robot_leaves_the_map_with_the_closures_that_placed_it() -> None:
     assert not graph.optimise().kept and graph.T_map_odom_of("b") is None
 
 
-def test_moments_of_one_robot_are_told_from_equal_ones_of_another() -> None:
+def test_moments_of_one_robot_are_distinguished_from_equal_ones_of_another() -> None:
     graph = driven("a", "b")
     for robot in ("a", "b"):
         own = closure(LAPS[robot], 10, 60)

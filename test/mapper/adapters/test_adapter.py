@@ -110,7 +110,7 @@ def test_what_is_withdrawn_while_it_waits_never_goes_and_later_it_is_reported(ar
     graph.wait(lambda: by_key(*node.own_diagnostics())["retracted too late"] == 1)
 
 
-def test_what_was_withdrawn_stays_out_when_the_other_topic_tells_it(around: Callable[..., Any]) -> None:
+def test_what_was_withdrawn_stays_out_when_the_other_topic_brings_it(around: Callable[..., Any]) -> None:
     graph = around("input:=constraints")
     node = graph.start(MessagesByStamp)
     graph.send(closure())

@@ -42,7 +42,7 @@ def seen_from_the_camera(T_body1_body2: np.ndarray) -> LoopClosure:
     return LoopClosure(from_ns=1, to_ns=2, T_from_to=T_from_to, covariance=covariance, labels=("cup",))
 
 
-def test_a_camera_that_looks_ahead_tells_of_the_motion_of_its_body() -> None:
+def test_a_camera_that_looks_ahead_gives_the_motion_of_its_body() -> None:
     """The body goes 1 m ahead and turns left: from where it ends, it was 1 m to the left, turned to the right."""
     turned_left = pose(rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])), np.array([1.0, 0.0, 0.0]))
     edge = fill_edge(SimpleNamespace(pose=blank()), seen_from_the_camera(turned_left), AHEAD)

@@ -73,7 +73,7 @@ def test_what_is_taken_out_leaves_no_trace() -> None:
     np.testing.assert_allclose(graph.poses(), before, atol=1e-3)
 
 
-def test_numbers_tell_edges_apart_whether_they_were_solved_or_still_wait() -> None:
+def test_numbers_distinguish_edges_whether_they_were_solved_or_still_wait() -> None:
     graph = row()
     right = graph.add_edges(edge(0, 5, translation(5.0, 0.2), sigma=1e-3))
     graph.solve_poses()

@@ -83,20 +83,20 @@ def test_what_is_not_expected_is_not_found() -> None:
     assert steady.heading == pytest.approx(WRONG.heading, abs=3e-3)
 
 
-def test_a_map_that_is_odometry_tells_nothing() -> None:
+def test_a_map_that_is_odometry_says_nothing() -> None:
     np.testing.assert_allclose(found(TRUE, TRUE, Steady(0.1, 0.1, 0.1)), 0.0, atol=1e-9)
 
 
-def test_long_steps_tell_as_much_as_short_ones() -> None:
+def test_long_steps_say_as_much_as_short_ones() -> None:
     true = np.array(square(laps=2, per_side=2))
     np.testing.assert_allclose(found(true, chained(true), Steady(0.1, 0.1, 0.1)), WRONG, atol=1e-3)
 
 
-def test_a_rest_tells_nothing_and_harms_nothing() -> None:
+def test_a_rest_says_nothing_and_harms_nothing() -> None:
     again, expected = [*range(9), *range(8, len(TRUE))], Steady(0.1, 0.1, 0.1)
     np.testing.assert_allclose(found(TRUE[again], MAPPED[again], expected), found(TRUE, MAPPED, expected), atol=1e-12)
 
 
-def test_one_pose_has_no_steps_and_tells_nothing() -> None:
+def test_one_pose_has_no_steps_and_says_nothing() -> None:
     assert corrected_steps(TRUE[:1], WRONG).shape == (0, 4, 4)
     assert estimate(TRUE[:1], TRUE[:1], np.zeros((0, 2)), Steady(0.1, 0.1, 0.1)) == Steady()
