@@ -86,9 +86,9 @@ def test_where_a_looped_bag_begins_anew_what_both_cameras_saw_before_is_hidden_f
 
 def test_a_clock_that_hides_sessions_says_so_and_one_that_hides_none_says_nothing() -> None:
     shown = keyframe(1, 20.0)
-    (told,) = clock_refusals(Clock(20 * SECOND, 3), frozenset({0, 2}), shown)
-    assert told.reason is Reason.CLOCK and told.to_ns == 20 * SECOND
-    assert told.detail == "the clock began anew at 20.000 s; sessions up to 2 had seen that time before"
+    (refusal,) = clock_refusals(Clock(20 * SECOND, 3), frozenset({0, 2}), shown)
+    assert refusal.reason is Reason.CLOCK and refusal.to_ns == 20 * SECOND
+    assert refusal.detail == "the clock began anew at 20.000 s; sessions up to 2 had seen that time before"
     assert clock_refusals(Clock(20 * SECOND, 3), frozenset(), shown) == ()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The search for places that a keyframe shows again, with a method and a gate that say what they are told."""
+"""The search for places that a keyframe shows again, with a method and a gate that answer as each test sets them."""
 
 from __future__ import annotations
 

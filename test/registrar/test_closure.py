@@ -43,8 +43,8 @@ def test_a_closure_and_a_refusal_name_the_sessions_of_their_moments_as_far_as_th
     accepted = Decision(target=STORED, candidate=candidate(matched=(ObjectPair(0, 0, "cup"),)))
     closure = closure_of(here, sightings, accepted, PARAMS)
     assert (closure.from_session, closure.to_session) == (STORED.session, 4)
-    told, unread = rejected(1, here, refusal, STORED), rejected(1, here, refusal)
-    assert (told.from_session, told.from_frame_id, told.to_session) == (STORED.session, STORED.frame_id, 4)
+    stored, unread = rejected(1, here, refusal, STORED), rejected(1, here, refusal)
+    assert (stored.from_session, stored.from_frame_id, stored.to_session) == (STORED.session, STORED.frame_id, 4)
     assert (unread.from_session, unread.from_frame_id, unread.to_frame_id) == (None, "", here.frame_id)
 
 

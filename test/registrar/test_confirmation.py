@@ -176,7 +176,7 @@ def test_nothing_waits_where_no_time_is_given() -> None:
     assert kind_of(confirmation.decide(*tried(0.6, ASIDE))) == "accepted"
 
 
-def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() -> None:
+def test_a_refusal_states_its_reason_its_moments_and_the_pose_that_was_refused() -> None:
     one = tried(0.0, certain_violations=0.2)
     verdict = Confirmation(PARAMS).decide(*one)
     assert isinstance(verdict, Rejected) and verdict.reason is Reason.FREE_SPACE

@@ -179,7 +179,7 @@ def test_what_was_withdrawn_of_another_robot_stays_so_after_a_restart(tmp_path: 
     again.registrar.close()
 
 
-def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_too_large_to_be_announced_is_counted_and_its_outcome_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(summary, "SUMMARY", replace(summary.SUMMARY, most_packed=1000, most_unpacked=1000))
     a = Robot("a")
     seen = _frame(10, HERE)
@@ -196,7 +196,7 @@ def test_a_keyframe_without_objects_of_ours_is_not_asked_for() -> None:
     assert a.exchange.counters["dropped: unlike"] == 1 and a.exchange.counters["summaries received"] == 1
 
 
-def test_a_summary_that_is_heard_twice_asks_nothing_twice() -> None:
+def test_a_summary_that_is_received_twice_asks_nothing_twice() -> None:
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)
     summary = b.sees(30, BESIDE)
@@ -220,21 +220,21 @@ def test_a_later_keyframe_of_ours_is_looked_at_by_the_other() -> None:
 
 
 @pytest.mark.parametrize(("of_a", "of_b"), [(30, 31), (31, 30), (30, 30)])
-def test_of_two_that_are_told_before_either_is_heard_that_of_the_older_is_compared(of_a: int, of_b: int) -> None:
+def test_of_two_summaries_sent_before_either_is_received_that_of_the_older_is_compared(of_a: int, of_b: int) -> None:
     a, b = Robot("a"), Robot("b")
-    told_by_a, told_by_b = a.sees(of_a, HERE), b.sees(of_b, BESIDE)
-    asked = a.exchange.receive_summary(told_by_b) is not None, b.exchange.receive_summary(told_by_a) is not None
+    sent_by_a, sent_by_b = a.sees(of_a, HERE), b.sees(of_b, BESIDE)
+    asked = a.exchange.receive_summary(sent_by_b) is not None, b.exchange.receive_summary(sent_by_a) is not None
     assert asked == ((True, False) if of_a <= of_b else (False, True))
 
 
-def test_whoever_has_a_keyframe_when_it_hears_looks_though_clocks_differ() -> None:
+def test_whoever_has_a_keyframe_when_it_receives_looks_though_clocks_differ() -> None:
     a, b = Robot("a"), Robot("b")
     b.exchange.receive_summary(a.sees(5000, HERE))
     outcome = a.fetches(b.sees(30, BESIDE), b)
     assert outcome is not None and _moments(outcome.closures) == [(("a", "b"), 5000, 30)]
 
 
-def test_a_keyframe_that_is_stored_but_not_told_yet_is_left_to_the_other() -> None:
+def test_a_keyframe_that_is_stored_but_not_announced_yet_is_left_to_the_other() -> None:
     a, b = Robot("a"), Robot("b")
     searched = a.searched(10, HERE)
     assert a.exchange.receive_summary(b.sees(30, BESIDE)) is None

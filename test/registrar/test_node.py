@@ -114,13 +114,13 @@ def test_a_reset_says_where_what_was_stored_is_now(make: Making, tmp_path: Path)
 def test_refusals_have_a_topic_of_their_own_and_their_counts_are_in_the_diagnostics(
     make: Making, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    node, told, status = make(), [], []
-    monkeypatch.setattr(node._announcements._refusals, "publish", told.append)
+    node, published, status = make(), [], []
+    monkeypatch.setattr(node._announcements._refusals, "publish", published.append)
     monkeypatch.setattr(node._diagnostics, "publish", status.append)
     turned_down = Rejected(reason=Reason.NO_CANDIDATE, from_ns=5, to_ns=9, detail="none of 3")
     node._publish(Outcome(rejected=(turned_down,)))
     assert node._announcements._refusals.topic_name == "/test_node/refusals" and status == []
-    (message,) = told
+    (message,) = published
     assert [refusal_of(one).detail for one in message.status] == ["none of 3"]
     node._report()
     values = {pair.key: pair.value for pair in status[0].status[0].values}
@@ -128,7 +128,7 @@ def test_refusals_have_a_topic_of_their_own_and_their_counts_are_in_the_diagnost
     node.close()
 
 
-def test_messages_are_heard_while_a_reset_waits_for_the_search_in_hand(make: Making) -> None:
+def test_messages_are_received_while_a_reset_waits_for_the_search_in_hand(make: Making) -> None:
     node = make()
     busy = threading.Event()
 
@@ -169,12 +169,12 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
     node.close()
 
 
-def test_others_are_told_of_the_keyframe_that_a_save_ends(make: Making) -> None:
-    node, told = make(), []
+def test_others_are_sent_the_keyframe_that_a_save_ends(make: Making) -> None:
+    node, sent = make(), []
     node._robot, node._exchange = "robot", SimpleNamespace(announce=lambda outcome: outcome.keyframe_id)
-    node._others = SimpleNamespace(send=lambda stamp_ns, summary: told.append((stamp_ns, summary)), close=lambda: None)
+    node._others = SimpleNamespace(send=lambda stamp_ns, summary: sent.append((stamp_ns, summary)), close=lambda: None)
     node._registrar.track(frame(20, CUP))
-    assert node._settle_and_save()[0] and told == [(20 * SECOND, 1)]
+    assert node._settle_and_save()[0] and sent == [(20 * SECOND, 1)]
     node.close()
 
 

@@ -28,8 +28,10 @@ def _sessions(origins: Origins, *arrivals: Arrival) -> list[int | None]:
 
 def test_sessions_of_different_runs_get_numbers_of_their_own_that_stay() -> None:
     origins = Origins(Store(), SessionNumbers(5))
-    told = _sessions(origins, _arrival("a", 1), _arrival("b", 1, robot="robot2"), _arrival("a", 2), _arrival("a", 3, 1))
-    assert told == [5, 6, 5, 7]
+    numbers = _sessions(
+        origins, _arrival("a", 1), _arrival("b", 1, robot="robot2"), _arrival("a", 2), _arrival("a", 3, 1)
+    )
+    assert numbers == [5, 6, 5, 7]
 
 
 def test_what_one_robot_sent_and_is_played_as_anothers_is_of_that_ones_own_session() -> None:
@@ -61,11 +63,11 @@ def test_a_store_that_is_opened_anew_goes_on_with_the_same_sessions_and_knows_wh
     assert stored.stamp_ns == 5 * SECOND and stored.origin == "robot1 a/0"
 
 
-@pytest.mark.parametrize("told", [{}, {"stamp_ns": 6 * SECOND}, {"frame_id": "other"}])
-def test_what_is_packed_is_what_the_header_tells_and_comes_under_the_robots_prefix(told: dict[str, object]) -> None:
-    header = {"stamp_ns": 5 * SECOND, "frame_id": "camera", "run": "a", "began_ns": 0, "first": 0, **told}
+@pytest.mark.parametrize("wrong", [{}, {"stamp_ns": 6 * SECOND}, {"frame_id": "other"}])
+def test_what_is_packed_is_what_the_header_says_and_comes_under_the_robots_prefix(wrong: dict[str, object]) -> None:
+    header = {"stamp_ns": 5 * SECOND, "frame_id": "camera", "run": "a", "began_ns": 0, "first": 0, **wrong}
     sent = SimpleNamespace(**header, packed=pack_keyframe(keyframe(0, 5)))
-    if told:
+    if wrong:
         with pytest.raises(ValueError, match="expected the stamp and frame"):
             arrival_of("robot1", sent)
         return

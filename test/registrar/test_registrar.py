@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The whole room: frames of a known room in, closures and refusals out."""
+"""The whole registrar: frames of a known room in, closures and refusals out."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_the_first_keyframe_has_no_candidate(revisit: tuple[list[LoopClosure], l
     assert revisit[1][0].reason is Reason.NO_CANDIDATE and revisit[1][0].to_ns == 0
 
 
-def test_a_refusal_tells_the_pose_that_was_turned_down() -> None:
+def test_a_refusal_gives_the_pose_that_was_turned_down() -> None:
     strict = PARAMS.replaced(max_translation=0.01)
     _, rejected = _run(Registrar(strict), _frame(0, HERE), _frame(30, BESIDE))
     (tried,) = [refusal for refusal in rejected if refusal.reason is Reason.IMPLAUSIBLE_MOTION]
@@ -290,8 +290,8 @@ def test_a_place_of_an_earlier_run_of_the_clock_that_reached_this_one_closes_not
     frames = [_frame(10.0, HERE), _frame(20.0, AWAY)]
     begun_anew = [_frame(12.0, AWAY), _frame(40.0, BESIDE)]  # in this run the camera was elsewhere at 10 s
     closures, rejected = _run(Registrar(PARAMS), *frames, *begun_anew)
-    (told,) = [r for r in rejected if r.reason is Reason.CLOCK]
-    assert told.detail == "the clock began anew at 12.000 s; sessions up to 1 had seen that time before"
+    (refusal,) = [r for r in rejected if r.reason is Reason.CLOCK]
+    assert refusal.detail == "the clock began anew at 12.000 s; sessions up to 1 had seen that time before"
     assert {closure.from_ns for closure in closures if closure.to_ns in (12 * SECOND, 40 * SECOND)} <= {12 * SECOND}
 
 

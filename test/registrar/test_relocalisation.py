@@ -43,7 +43,7 @@ def frame(seconds: float, T_odom_camera: Array | None) -> Frame:
 
 
 class Pass:
-    """The later pass: it goes along x, and closes with the earlier one where it is told to."""
+    """The later pass: it goes along x, and closes with the earlier one where it is asked to."""
 
     def __init__(self) -> None:
         self.relocalisation = Relocalisation()
@@ -84,7 +84,7 @@ def test_one_closure_is_not_enough_and_the_reason_counts_it(walk: Pass) -> None:
     assert f"1 to session {EARLIER}; expected two that agree" in walk.relocalisation.reason
 
 
-def test_two_that_agree_tell_where_the_camera_is_and_odometry_goes_on(walk: Pass) -> None:
+def test_two_that_agree_show_where_the_camera_is_and_odometry_goes_on(walk: Pass) -> None:
     walk.close(0.0)
     walk.close(0.4)
     first = walk.relocalisation.relocalised
@@ -109,7 +109,7 @@ def test_one_that_is_very_likely_or_that_others_confirmed_is_enough(walk: Pass) 
     assert other.relocalisation.relocalised is not None
 
 
-def test_two_that_disagree_tell_nothing_and_two_more_on_one_side_do(walk: Pass) -> None:
+def test_two_that_disagree_show_nothing_and_two_more_on_one_side_do(walk: Pass) -> None:
     walk.close(0.0, wrong=ASIDE)
     walk.close(0.2, odds=ALONE_ODDS)
     assert walk.relocalisation.relocalised is None
@@ -141,7 +141,7 @@ def test_closures_of_two_earlier_sessions_do_not_confirm_each_other(walk: Pass) 
     assert f"1 to session {EARLIER - 1}, 1 to session {EARLIER}" in walk.relocalisation.reason
 
 
-def test_a_closure_within_a_session_tells_nothing(walk: Pass) -> None:
+def test_a_closure_within_a_session_says_nothing(walk: Pass) -> None:
     walk.close(0.0, odds=ALONE_ODDS, earlier=NOW)
     assert walk.relocalisation.relocalised is None and "no closure" in walk.relocalisation.reason
 
@@ -159,7 +159,7 @@ def test_another_session_and_a_silence_forget(walk: Pass) -> None:
     assert walk.relocalisation.relocalised is None
 
 
-def test_a_search_that_ends_after_a_silence_tells_of_odometry_that_is_over(walk: Pass) -> None:
+def test_a_search_that_ends_after_a_silence_is_of_odometry_that_is_over(walk: Pass) -> None:
     walk.go(0.0)
     walk.go(0.0, seconds=101.0 + SILENCE_S)
     source, target = place(NOW, 100.0, np.eye(4), 0.0), place(EARLIER, 10.0, np.eye(4), 0.0)
@@ -180,7 +180,7 @@ def test_the_way_since_the_keyframe_counts_when_its_search_ends_later(walk: Pass
     assert found is not None and found.covariance[5, 5] == pytest.approx((TIGHT + drift(13.0))[5, 5])
 
 
-def test_without_odometry_the_newest_keyframe_is_told() -> None:
+def test_without_odometry_the_newest_keyframe_is_reported() -> None:
     relocalisation = Relocalisation()
     relocalisation.note_frame(frame(100.0, None), NOW)
     source = replace(place(NOW, 100.0, moved(0.3), 0.3), by_odometry=False)

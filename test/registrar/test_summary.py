@@ -39,14 +39,14 @@ from objreg_ros.registration.keyframe import Keyframe
 SUMMARY, REQUEST, DELIVERY = (kind.mark for kind in (module.SUMMARY, module.REQUEST, module.DELIVERY))
 THINGS = tuple(box(label, (0.3 * k, 0.0, 1.0), instance=k) for k, label in enumerate(("cup", "tasse à thé", "book")))
 PLACE: Keyframe = replace(keyframe(7, 12.5, THINGS, session=3), robot="robot2", by_odometry=True, travelled=4.25)
-TOLD = Summary(
+OF_PLACE = Summary(
     name=Name("abc", 7),
     frame_id="front",
     clock=Clock(5, 2),
     sightings=sightings_of(PLACE),
     received={"xyz": 41, "uvw": 1},
 )
-PACKED = pack_summary(TOLD)
+PACKED = pack_summary(OF_PLACE)
 READERS: dict[bytes, Callable[[bytes], Any]] = {
     SUMMARY: unpack_summary,
     REQUEST: unpack_request,
@@ -67,9 +67,14 @@ def body_of(packed: bytes) -> bytes:
 
 def test_a_summary_comes_back_with_what_retrieval_needs() -> None:
     back = unpack_summary(PACKED)
-    assert (back.name, back.frame_id, back.clock, back.received) == (TOLD.name, "front", TOLD.clock, TOLD.received)
+    assert (back.name, back.frame_id, back.clock, back.received) == (
+        OF_PLACE.name,
+        "front",
+        OF_PLACE.clock,
+        OF_PLACE.received,
+    )
     assert back.robot == "robot2" and len(back.sightings) == 3
-    for before, after in zip(TOLD.sightings, back.sightings, strict=True):
+    for before, after in zip(OF_PLACE.sightings, back.sightings, strict=True):
         for name in ("keyframe_id", "session", "stamp_ns", "label", "travelled", "by_odometry", "robot"):
             assert getattr(after, name) == getattr(before, name), name
         assert np.abs(after.position - before.position).max() < 1e-6
@@ -78,7 +83,7 @@ def test_a_summary_comes_back_with_what_retrieval_needs() -> None:
 
 def test_a_summary_is_small() -> None:
     many = tuple(box("cup", (0.1 * k, 0.0, 1.0), 0.05 + 0.01 * k, k) for k in range(15))
-    packed = pack_summary(replace(TOLD, sightings=sightings_of(keyframe(7, 12.5, many))))
+    packed = pack_summary(replace(OF_PLACE, sightings=sightings_of(keyframe(7, 12.5, many))))
     assert len(packed) < 1200
 
 
@@ -178,7 +183,7 @@ def test_a_bomb_takes_no_memory(size: int) -> None:
 def test_what_is_too_large_is_neither_read_nor_written() -> None:
     with pytest.raises(ValueError, match="expected a request of 13 to 100000 bytes, got 100001"):
         unpack_request(bytes(100_001))
-    many = replace(TOLD, sightings=tuple(replace(one, label="x" * 1000) for one in TOLD.sightings * 200))
+    many = replace(OF_PLACE, sightings=tuple(replace(one, label="x" * 1000) for one in OF_PLACE.sightings * 200))
     with pytest.raises(ValueError, match="expected a summary of at most 400000 bytes unpacked, got"):
         pack_summary(many)
 
