@@ -105,10 +105,10 @@ def noetic_bag(path: Path, frames: int = 3) -> Path:
     types.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf/msg/tfMessage"))
     made = types.types
     header = made["std_msgs/msg/Header"](seq=0, stamp=made["builtin_interfaces/msg/Time"](1, 0), frame_id="map")
-    words = {"level": 2, "name": "n", "msg": "m", "file": "f", "function": "f", "line": 1, "topics": []}
+    fields = {"level": 2, "name": "n", "msg": "m", "file": "f", "function": "f", "line": 1, "topics": []}
     others = {
         "/tf": made["tf/msg/tfMessage"](transforms=[]),
-        "/rosout": made["rosgraph_msgs/msg/Log"](header=header, **words),
+        "/rosout": made["rosgraph_msgs/msg/Log"](header=header, **fields),
         "/arm/0": made["std_msgs/msg/String"](data="a name that ROS 2 does not allow"),
         "/markers": made["visualization_msgs/msg/MarkerArray"](markers=[]),
     }
@@ -144,9 +144,9 @@ def humble_bag(path: Path, plugin: StoragePlugin = StoragePlugin.MCAP) -> Path:
     types = get_typestore(Stores.ROS2_HUMBLE)
     made = types.types
     header = made["std_msgs/msg/Header"](stamp=made["builtin_interfaces/msg/Time"](1, 0), frame_id="sonar")
-    words = {"radiation_type": 0, "field_of_view": 0.5, "min_range": 0.1, "max_range": 4.0, "range": 1.5}
+    fields = {"radiation_type": 0, "field_of_view": 0.5, "min_range": 0.1, "max_range": 4.0, "range": 1.5}
     said = {
-        "/range": made["sensor_msgs/msg/Range"](header=header, **words),
+        "/range": made["sensor_msgs/msg/Range"](header=header, **fields),
         "/chatter": made["std_msgs/msg/String"](data="hello"),
         "/nothing": made["std_msgs/msg/Empty"](),
     }

@@ -22,7 +22,7 @@ def bags(folder: Path) -> list[Path]:
 
 
 @pytest.mark.parametrize("kind", range(3), ids=["tum", "rosbag2", "rosbag1"])
-def test_the_camera_that_is_told_takes_the_place_of_any_other_in_the_size_of_the_pictures(
+def test_the_camera_that_is_given_takes_the_place_of_any_other_in_the_size_of_the_pictures(
     kind: int, tmp_path: Path
 ) -> None:
     with open_recording(bags(tmp_path)[kind]) as opened:
@@ -65,6 +65,6 @@ def test_pictures_of_another_shape_are_refused_with_the_topic(tmp_path: Path) ->
 def test_what_was_chosen_of_a_file_with_several_cameras_is_said(tmp_path: Path) -> None:
     one = "  camera_model: pinhole\n  intrinsics: [50.0, 50.0, 31.5, 23.5]\n  resolution: [64, 48]\n"
     (tmp_path / "chain.yaml").write_text(f"cam0:\n{one}cam1:\n{one}")
-    told = with_camera(open_recording(tum_folder(tmp_path / "tum")), str(tmp_path / "chain.yaml"))
-    assert any(note.startswith("chain.yaml: the file has several cameras: cam0 is used") for note in told.notes)
-    assert told.of_pictures
+    chosen = with_camera(open_recording(tum_folder(tmp_path / "tum")), str(tmp_path / "chain.yaml"))
+    assert any(note.startswith("chain.yaml: the file has several cameras: cam0 is used") for note in chosen.notes)
+    assert chosen.of_pictures

@@ -23,8 +23,8 @@ def bag(place: Path, *more: Record, child: str = "base", camera: str = "eye") ->
     """Depth of a camera and odometry of a body, and more."""
     odometry = messages.odometry(np.eye(4), np.eye(6), 1, "odom", child)
     depth = messages.image(np.full((48, 64), 1000, np.uint16), "16UC1", 1, camera)
-    told = messages.camera_info(CAMERA, 1, camera)
-    said = {"/odom": odometry, "/depth/image": depth, "/camera_info": told}
+    camera_info = messages.camera_info(CAMERA, 1, camera)
+    said = {"/odom": odometry, "/depth/image": depth, "/camera_info": camera_info}
     write_rosbag2(place, [*(Record.of(topic, message, 1) for topic, message in said.items()), *more])
     return place
 
@@ -39,12 +39,12 @@ def test_the_camera_on_the_body_of_the_odometry_is_what_tf_static_says_whenever(
         assert not [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]
 
 
-def test_a_body_that_nothing_ties_to_the_camera_is_told_with_what_to_do(tmp_path: Path) -> None:
+def test_a_body_that_nothing_ties_to_the_camera_is_stated_with_what_to_do(tmp_path: Path) -> None:
     with open_recording(bag(tmp_path / "bag")) as source:
         assert camera_on_body(source, choose_inputs(source.topics)) == ("base", "eye", None, None)
         assert frame_tree(source).between("base", "eye") is None
-        (told,) = [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]
-        assert told.text.startswith("odometry is of base and depth in eye") and "set T_base_camera" in told.text
+        (warning,) = [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]
+        assert warning.text.startswith("odometry is of base and depth in eye") and "set T_base_camera" in warning.text
 
 
 @pytest.mark.parametrize("names", [{"child": ""}, {"camera": ""}, {"child": "eye"}])

@@ -17,9 +17,9 @@ def seen() -> Record:
     return Record.of("/truth", messages.pose_stamped(np.eye(4), 7, "world"), 7)
 
 
-def test_a_record_of_a_pose_tells_it() -> None:
-    word = pose_of(seen())
-    assert word is not None and word.stamp_ns == 7 and np.array_equal(word.T_odom_body, np.eye(4))
+def test_a_record_of_a_pose_gives_it() -> None:
+    sample = pose_of(seen())
+    assert sample is not None and sample.stamp_ns == 7 and np.array_equal(sample.T_odom_body, np.eye(4))
 
 
 @pytest.mark.parametrize("value", [0.0, float("nan"), float("inf")])

@@ -22,10 +22,10 @@ T_ORIGIN = np.eye(4)
 
 
 class MessagesByStamp(Recording):
-    """A recording of so many topics, that knows when it is closed; its types are those of a ROS 1 if it is told so."""
+    """A recording of so many topics, that knows when it is closed; its types are those of a ROS 1 if asked for."""
 
     def __init__(self, *msgtypes: str, span: tuple[int, int] = (0, 0), types: Typestore | None = None) -> None:
-        self.path, self.kind, self.notes = Path(), "shelf", []
+        self.path, self.kind, self.notes = Path(), "stamps", []
         self.topics = {f"/t{k}": Topic(f"/t{k}", msgtype, 1) for k, msgtype in enumerate(msgtypes)}
         self.start_ns, self.end_ns = span
         self.types, self.closed = types, 0
@@ -85,9 +85,9 @@ def test_what_does_not_decode_reads_as_nothing() -> None:
     assert Record.made("/camera_info", "sensor_msgs/msg/CameraInfo", 7, make).read() is None
 
 
-def test_topics_that_ros_2_cannot_have_are_told_with_the_reason_and_no_others() -> None:
-    shelf = MessagesByStamp("sensor_msgs/msg/Image", "my_msgs/msg/Odd", "rosgraph_msgs/msg/Log")
-    assert shelf.obstacles() == {
+def test_topics_that_ros_2_cannot_have_are_stated_with_the_reason_and_no_others() -> None:
+    recording = MessagesByStamp("sensor_msgs/msg/Image", "my_msgs/msg/Odd", "rosgraph_msgs/msg/Log")
+    assert recording.obstacles() == {
         "/t1": "ROS 2 does not ship my_msgs/msg/Odd",
         "/t2": "ROS 2 does not ship rosgraph_msgs/msg/Log",
     }
@@ -96,9 +96,9 @@ def test_topics_that_ros_2_cannot_have_are_told_with_the_reason_and_no_others() 
 
 @pytest.mark.parametrize("name", ["/camera/0/info", "/a/", "/a-b", "/a//b", "/é", "/" + "a" * 250, "/", ""])
 def test_a_name_that_ros_2_does_not_allow_is_an_obstacle(name: str) -> None:
-    shelf = MessagesByStamp()
-    shelf.topics = {name: Topic(name, "sensor_msgs/msg/Image", 1)}
-    assert shelf.obstacles() == shelf.obstacles(shipped_only=False) == {name: "no valid name in ROS 2"}
+    recording = MessagesByStamp()
+    recording.topics = {name: Topic(name, "sensor_msgs/msg/Image", 1)}
+    assert recording.obstacles() == recording.obstacles(shipped_only=False) == {name: "no valid name in ROS 2"}
 
 
 @pytest.mark.parametrize("name", ["/image", "image", "/camera_0/Info", "/_a/a__b/c9"])
@@ -123,12 +123,12 @@ def test_a_recording_lasts_from_its_first_record_to_its_last_and_never_less_than
 
 
 def test_a_recording_is_closed_when_it_is_left_even_by_an_error() -> None:
-    with MessagesByStamp() as shelf:
-        assert isinstance(shelf, MessagesByStamp) and shelf.closed == 0
-    assert shelf.closed == 1
-    with pytest.raises(OSError, match="gone"), shelf:
+    with MessagesByStamp() as recording:
+        assert isinstance(recording, MessagesByStamp) and recording.closed == 0
+    assert recording.closed == 1
+    with pytest.raises(OSError, match="gone"), recording:
         raise OSError("gone")
-    assert shelf.closed == 2
+    assert recording.closed == 2
 
 
 def test_what_cannot_be_read_in_order_of_time_is_no_recording() -> None:

@@ -32,7 +32,7 @@ def test_inputs_go_out_under_the_names_of_the_graph(recording: Recording) -> Non
     }
 
 
-def test_compressed_inputs_go_out_where_compressed_ones_are_heard(recording: Recording) -> None:
+def test_compressed_inputs_go_out_where_compressed_ones_are_subscribed_to(recording: Recording) -> None:
     recording.topics = {name: Topic(name, "sensor_msgs/msg/CompressedImage", 1) for name in ("/jpeg", "/png")}
     names = graph_names(recording, Inputs(image="/jpeg", depth="/png"))
     assert names == {"/jpeg": "image/compressed", "/png": "depth/image/compressedDepth"}
@@ -52,19 +52,19 @@ def test_a_selection_is_a_part_in_time_of_some_topics(recording: Recording) -> N
 
 def latched_infos(path: Path, *depths: int) -> Path:
     """A rosbag2 of 1 s whose camera_info, from as many publishers, came in its first four tenths only."""
-    told = [r for r in records(11) if r.topic != "/camera_info" or r.stamp_ns < 10**9 + 4 * STEP_NS]
-    write_rosbag2(path, told, offered_qos={"/camera_info": [latched_qos(depth) for depth in depths]})
+    kept = [r for r in records(11) if r.topic != "/camera_info" or r.stamp_ns < 10**9 + 4 * STEP_NS]
+    write_rosbag2(path, kept, offered_qos={"/camera_info": [latched_qos(depth) for depth in depths]})
     return path
 
 
-@pytest.mark.parametrize(("depths", "told"), [((1,), [3]), ((0, 0), [2, 3]), ((2, 1), [1, 2, 3])])
+@pytest.mark.parametrize(("depths", "latched_steps"), [((1,), [3]), ((0, 0), [2, 3]), ((2, 1), [1, 2, 3])])
 def test_a_selection_begins_with_what_was_latched_before_it(
-    depths: tuple[int, ...], told: list[int], tmp_path: Path
+    depths: tuple[int, ...], latched_steps: list[int], tmp_path: Path
 ) -> None:
     with open_recording(latched_infos(tmp_path / "bag", *depths)) as recording:
         played = list(Selection({"/camera_info": "camera_info", "/image": "image"}, start=0.5).records(recording))
-        latched, others = played[: len(told)], played[len(told) :]
-        assert [headers.stamp_ns(r.message) for r in latched] == [10**9 + k * STEP_NS for k in told]
+        latched, others = played[: len(latched_steps)], played[len(latched_steps) :]
+        assert [headers.stamp_ns(r.message) for r in latched] == [10**9 + k * STEP_NS for k in latched_steps]
         assert {(r.topic, r.stamp_ns) for r in latched} == {("/camera_info", others[0].stamp_ns)}
         assert [r.topic for r in others] == ["/image"] * 6
 

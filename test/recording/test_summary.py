@@ -19,7 +19,7 @@ def bag(path: Path, items: Iterator[Record] | list[Record]) -> Recording:
     return open_recording(path)
 
 
-def test_every_topic_is_told_with_its_rate_and_its_first_message(tmp_path: Path) -> None:
+def test_every_topic_is_listed_with_its_rate_and_its_first_message(tmp_path: Path) -> None:
     lines = {line.topic: line for line in describe_topics(bag(tmp_path / "bag", records(11)))}
     assert lines["/image"].rate == pytest.approx(10, rel=1e-6) and lines["/image"].count == 11
     assert lines["/image"].what == "64 × 48 rgb8, camera"
@@ -27,7 +27,7 @@ def test_every_topic_is_told_with_its_rate_and_its_first_message(tmp_path: Path)
     assert lines["/odom"].what == "odom → camera"
 
 
-def test_a_cloud_is_told_with_its_fields(tmp_path: Path) -> None:
+def test_a_cloud_is_listed_with_its_fields(tmp_path: Path) -> None:
     rows = np.zeros((2, 3), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     cloud = Record.of("/points", messages.point_cloud(rows, 5, "c"), 5)
     (line,) = describe_topics(bag(tmp_path / "bag", [cloud]))

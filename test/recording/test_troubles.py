@@ -68,9 +68,9 @@ def test_depth_of_another_size_than_colour_is_said(tmp_path: Path) -> None:
 
 def test_depth_in_another_frame_than_colour_is_said_with_how_to_register_it(tmp_path: Path) -> None:
     recording = bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", frame_id="camera_depth_optical_frame"))
-    told = said(recording)
-    assert "colour is in the frame c and depth in camera_depth_optical_frame" in told
-    assert "align_depth.enable:=true" in told and "depth_registered" in told
+    text = said(recording)
+    assert "colour is in the frame c and depth in camera_depth_optical_frame" in text
+    assert "align_depth.enable:=true" in text and "depth_registered" in text
 
 
 def test_depth_that_is_registered_here_is_no_trouble_but_a_remark(tmp_path: Path) -> None:
@@ -139,8 +139,8 @@ def streams(path: Path, colour_hz: float, depth_hz: float, colour_from_s: float 
 def test_streams_of_other_rates_and_beginnings_that_meet_are_fine(
     colour_hz: float, depth_hz: float, colour_from_s: float, tmp_path: Path
 ) -> None:
-    told = streams(tmp_path / "bag", colour_hz, depth_hz, colour_from_s)
-    assert "apart" not in told and "different times" not in told
+    text = streams(tmp_path / "bag", colour_hz, depth_hz, colour_from_s)
+    assert "apart" not in text and "different times" not in text
 
 
 def test_how_far_the_slower_stream_is_from_the_faster_one_is_said(tmp_path: Path) -> None:
@@ -161,8 +161,8 @@ def test_streams_one_after_the_other_are_said(tmp_path: Path) -> None:
 def test_stamps_that_stand_still_are_said(stamp_ns: int, tmp_path: Path) -> None:
     rgb = np.zeros((4, 4, 3), np.uint8)
     pictures = [Record.of("/image", messages.image(rgb, "rgb8", stamp_ns, "c"), 9 + i) for i in range(3)]
-    told = said(bag(tmp_path / "bag", pictures))
-    assert f"the first 3 stamps of colour are all {stamp_ns} ns" in told and "record it again" in told
+    text = said(bag(tmp_path / "bag", pictures))
+    assert f"the first 3 stamps of colour are all {stamp_ns} ns" in text and "record it again" in text
 
 
 def test_stamps_that_go_back_are_said(tmp_path: Path) -> None:
@@ -178,8 +178,8 @@ def test_an_uncalibrated_camera_is_said_only_where_a_cloud_needs_one(
     rows = np.ones((height, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     cloud = Record.of("/points", messages.point_cloud(rows, 5, "c"), 5)
     _, image, _ = depth_and_colour(METRE, "16UC1")
-    told = said(bag(tmp_path / "bag", [uncalibrated(5), image, cloud]))
-    assert told.count("expected a calibrated K") + told.count("not organised") == complaints
+    text = said(bag(tmp_path / "bag", [uncalibrated(5), image, cloud]))
+    assert text.count("expected a calibrated K") + text.count("not organised") == complaints
 
 
 def test_what_the_reader_assumed_is_passed_on(tmp_path: Path) -> None:
@@ -203,8 +203,8 @@ def test_what_only_informs_is_no_trouble_of_a_run(tmp_path: Path) -> None:
 
 
 def test_stamps_of_two_clocks_are_not_to_be_bridged(tmp_path: Path) -> None:
-    told = said(bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", later=10**9)))
-    assert "record both with stamps of one clock" in told and "segmenter.slop=" not in told
+    text = said(bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", later=10**9)))
+    assert "record both with stamps of one clock" in text and "segmenter.slop=" not in text
 
 
 def test_a_folder_of_pictures_is_not_advised_to_take_other_topics(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_odometry_is_of_the_optical_frame_where_z_is_up(tmp_path: Path) -> None:
     assert poses[0].child_frame_id == "camera"
 
 
-def test_times_of_frames_are_taken_where_they_are_told(tmp_path: Path) -> None:
+def test_times_of_frames_are_taken_where_they_are_given(tmp_path: Path) -> None:
     recording = open_recording(folder(tmp_path, frameTimestamps=[7.0, 7.5, 9.0]))
     assert [r.stamp_ns for r in recording.records(["/image"])] == [7 * 10**9, 75 * 10**8, 9 * 10**9]
 

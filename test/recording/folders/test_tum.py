@@ -25,9 +25,9 @@ def test_a_folder_is_a_recording_of_standard_messages(lists: bool, tmp_path: Pat
         ("/camera_info", "/ground_truth", "/image", "/depth/image"), 3
     )
     first = {r.topic: r.message for r in recording.records(end_ns=1)}
-    word = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
-    assert word.depth[0, 0] == 1 and word.rgb is not None and word.rgb[0, 0].tolist() == [200, 0, 0]
-    assert word.intrinsics.cx == 31.5 and word.frame_id == "camera"
+    read = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
+    assert read.depth[0, 0] == 1 and read.rgb is not None and read.rgb[0, 0].tolist() == [200, 0, 0]
+    assert read.intrinsics.cx == 31.5 and read.frame_id == "camera"
 
 
 def test_records_come_in_order_of_time(tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_an_accelerometer_is_an_imu_around_the_time_of_the_pictures(tmp_path: Pa
     recording = open_recording(tmp_path)
     felt = [motion_from_msg.imu(record.message) for record in recording.records(["/imu"])]
     assert recording.topics["/imu"].count == len(felt) == 3
-    assert [word.stamp_ns for word in felt] == [-100_000_000, 50_000_000, 150_000_000]
+    assert [sample.stamp_ns for sample in felt] == [-100_000_000, 50_000_000, 150_000_000]
     assert felt[0].acceleration is not None and felt[0].acceleration.tolist() == [0.1, -9.7, 0.5]
     assert felt[0].angular_velocity is None and felt[0].orientation is None and felt[0].frame_id == "accelerometer"
     assert choose_inputs(recording.topics).imu == "/imu"
@@ -120,8 +120,8 @@ def test_files_among_the_pictures_that_are_none_are_left_out_by_name(tmp_path: P
         (folder / name).write_text("x")
     recording = open_recording(folder)
     assert recording.topics["/image"].count == 2
-    told = "no pictures, and left out: rgb/.DS_Store, rgb/._1.0.png, rgb/Thumbs.db, depth/notes.txt"
-    assert told in recording.notes
+    note = "no pictures, and left out: rgb/.DS_Store, rgb/._1.0.png, rgb/Thumbs.db, depth/notes.txt"
+    assert note in recording.notes
 
 
 @pytest.mark.parametrize("comment", ["\ufeff# times", "  # times", "\t# times"])
@@ -330,10 +330,10 @@ def test_the_distortion_of_a_folder_s_camera_is_undone_in_depth_and_colour(tmp_p
         file.write("\ndistortion: [-0.3, 0.1, 0.001, 0.002, 0]\n")
     first = {r.topic: r.message for r in open_recording(folder).records(end_ns=1)}
     said = first["/depth/image"], first["/camera_info"], first["/image"]
-    word, raw, of = lenses.depth_image(*said), from_msg.depth_image(*said), lenses.lens_of(first["/camera_info"])
+    rectified, raw, of = lenses.depth_image(*said), from_msg.depth_image(*said), lenses.lens_of(first["/camera_info"])
     assert of is not None and of.D == (-0.3, 0.1, 0.001, 0.002, 0)
-    assert np.array_equal(word.depth, of.rectify_depth(raw.depth)) and (word.depth > 0).any()
-    assert raw.rgb is not None and np.array_equal(word.rgb, of.rectify_colour(raw.rgb))
+    assert np.array_equal(rectified.depth, of.rectify_depth(raw.depth)) and (rectified.depth > 0).any()
+    assert raw.rgb is not None and np.array_equal(rectified.rgb, of.rectify_colour(raw.rgb))
 
 
 @pytest.mark.parametrize("sign", [",", ", ", "\t", ";"])
@@ -342,8 +342,8 @@ def test_columns_may_be_parted_by_commas(lists: bool, sign: str, tmp_path: Path)
     plain, parted = tum_folder(tmp_path / "plain", lists=lists), tum_folder(tmp_path / "parted", lists=lists)
     for file in parted.glob("*.txt"):
         file.write_bytes(b"\xef\xbb\xbf" + file.read_text().replace("\n", "\r\n").replace(" ", sign).encode())
-    told = [[(r.stamp_ns, r.topic) for r in open_recording(folder).records()] for folder in (plain, parted)]
-    assert told[0] == told[1] and len(told[0]) == 12
+    stamps = [[(r.stamp_ns, r.topic) for r in open_recording(folder).records()] for folder in (plain, parted)]
+    assert stamps[0] == stamps[1] and len(stamps[0]) == 12
 
 
 def test_depth_may_come_first_in_a_list_of_pairs(tmp_path: Path) -> None:
@@ -369,9 +369,9 @@ def test_the_truth_is_read_as_its_header_names_the_columns(tmp_path: Path) -> No
     folder = numbered_folder(tmp_path, {"1403636579763555584": 0})
     header = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"
     (folder / "groundtruth.txt").write_text(f"{header}\n1403636579763555584,1,2,3,0,0,0,1\n")
-    word = motion_from_msg.odometry(next(open_recording(folder).records(["/ground_truth"])).message)
-    assert word.stamp_ns == 1403636579763555584 and word.T_odom_body[:3, 3].tolist() == [1, 2, 3]
-    assert np.allclose(word.T_odom_body[:3, :3], np.diag([-1, -1, 1]))
+    true = motion_from_msg.odometry(next(open_recording(folder).records(["/ground_truth"])).message)
+    assert true.stamp_ns == 1403636579763555584 and true.T_odom_body[:3, 3].tolist() == [1, 2, 3]
+    assert np.allclose(true.T_odom_body[:3, :3], np.diag([-1, -1, 1]))
 
 
 @pytest.mark.parametrize("of_colour", [False, True])
@@ -383,7 +383,7 @@ def test_larger_colour_is_brought_to_the_size_of_depth(of_colour: bool, tmp_path
         (folder / "camera.yaml").write_text("fx: 100\nfy: 100\ncx: 63.5\ncy: 47.5\ndepth_scale: 1000\n")
     recording = open_recording(folder)
     first = {r.topic: r.message for r in recording.records(end_ns=1)}
-    word = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
-    assert word.rgb is not None and word.rgb.shape == (48, 64, 3) and word.rgb[0, 0].tolist() == [200, 0, 0]
-    assert (word.intrinsics.fx, word.intrinsics.cx, word.intrinsics.cy) == (50, 31.5, 23.5)
+    read = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
+    assert read.rgb is not None and read.rgb.shape == (48, 64, 3) and read.rgb[0, 0].tolist() == [200, 0, 0]
+    assert (read.intrinsics.fx, read.intrinsics.cx, read.intrinsics.cy) == (50, 31.5, 23.5)
     assert "colour has 128 × 96 pixels and depth 64 × 48: colour is brought to the size of depth" in recording.notes

@@ -66,7 +66,7 @@ def test_a_focal_length_below_0_is_that_of_rows_that_count_downwards(tmp_path: P
         camera(tmp_path, WHOLE.replace("fx: 585", "fx: -585"))
 
 
-def test_the_settings_of_orb_slam_tell_the_depth_scale_too(tmp_path: Path) -> None:
+def test_the_settings_of_orb_slam_give_the_depth_scale_too(tmp_path: Path) -> None:
     names = "Camera.fx: 481.2\nCamera.fy: -480.0\nCamera.cx: 319.5\nCamera.cy: 239.5\nDepthMapFactor: 5208.0\n"
     read = camera(tmp_path, f"%YAML:1.0\n---\n{names}")
     assert pinhole(read) == (481.2, 480, 319.5, 239.5) and read.depth_scale == 5208

@@ -34,7 +34,7 @@ def test_a_first_line_of_names_is_no_row(tmp_path: Path) -> None:
         ("# ground truth trajectory", USUAL),
     ],
 )  # fmt: skip
-def test_a_header_tells_which_column_is_what(header: str, columns: tuple[int, ...], tmp_path: Path) -> None:
+def test_a_header_says_which_column_is_what(header: str, columns: tuple[int, ...], tmp_path: Path) -> None:
     (tmp_path / "truth.txt").write_text(f"# a comment\n{header}\n1 2 3 4 5 6 7 8\n")
     assert pose_columns(read_table(tmp_path / "truth.txt", 8).names) == columns
 

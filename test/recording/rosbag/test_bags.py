@@ -260,9 +260,9 @@ def test_text_that_is_called_a_bag_is_refused(tmp_path: Path) -> None:
 
 def test_a_topic_of_two_types_is_that_of_the_more_messages_and_the_others_are_counted(tmp_path: Path) -> None:
     types = standard_types()
-    word, number = (types.types[f"std_msgs/msg/{name}"] for name in ("String", "Int8"))
+    text, number = (types.types[f"std_msgs/msg/{name}"] for name in ("String", "Int8"))
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        for made in (number(data=1), word(data="a"), word(data="b")):
+        for made in (number(data=1), text(data="a"), text(data="b")):
             kind = made.__msgtype__
             known = [c for c in writer.connections if c.msgtype == kind]
             connection = known[0] if known else writer.add_connection("/x", kind, typestore=types)
@@ -287,10 +287,10 @@ def test_a_bag_that_may_not_be_read_is_not_called_broken(tmp_path: Path, monkeyp
     (file,) = (tmp_path / "bag").glob("*.mcap")
     whole = Path.open
 
-    def refuse(path: Path, *words: object, **more: object) -> object:
+    def refuse(path: Path, *arguments: object, **more: object) -> object:
         if path.suffix == ".mcap":
             raise PermissionError(13, "Permission denied", str(path))
-        return whole(path, *words, **more)  # type: ignore[call-overload]
+        return whole(path, *arguments, **more)  # type: ignore[call-overload]
 
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(PermissionError, match=r"expected permission to read it, got: Permission denied"):

@@ -67,7 +67,7 @@ def test_a_message_that_lacks_a_field_of_ros_2_is_refused() -> None:
         messages.serialise(old)
 
 
-def test_what_keeps_an_old_type_from_being_brought_up_to_date_is_told() -> None:
+def test_what_keeps_an_old_type_from_being_brought_up_to_date_is_stated() -> None:
     noetic = get_typestore(Stores.ROS1_NOETIC)
     assert messages.obstacle("sensor_msgs/msg/CameraInfo", noetic) == ""
     assert messages.obstacle("visualization_msgs/msg/MarkerArray", noetic).startswith(
@@ -76,7 +76,7 @@ def test_what_keeps_an_old_type_from_being_brought_up_to_date_is_told() -> None:
     assert messages.obstacle("rosgraph_msgs/msg/Log", noetic) == "ROS 2 does not ship rosgraph_msgs/msg/Log"
 
 
-def test_a_type_whose_bytes_are_read_otherwise_in_ros_2_jazzy_is_told() -> None:
+def test_a_type_whose_bytes_are_read_otherwise_in_ros_2_jazzy_is_stated() -> None:
     humble, foxy = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS2_FOXY)
     assert messages.difference("sensor_msgs/msg/Range", humble).endswith("other fields than in ROS 2 Jazzy: variance")
     assert "visualization_msgs/msg/Marker has other" in messages.difference("visualization_msgs/msg/MarkerArray", foxy)
