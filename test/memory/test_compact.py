@@ -229,9 +229,9 @@ def test_a_head_that_lies_is_refused_or_a_keyframe(data: st.DataObject) -> None:
     ],
 )
 def test_a_lie_is_named(change: Change, said: str) -> None:
-    with pytest.raises(ValueError, match="expected a packed keyframe, got") as told:
+    with pytest.raises(ValueError, match="expected a packed keyframe, got") as raised:
         unpack_keyframe(changed(change))
-    assert said in str(told.value)
+    assert said in str(raised.value)
 
 
 def test_an_object_behind_the_camera_is_refused() -> None:

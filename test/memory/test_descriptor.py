@@ -18,7 +18,7 @@ def test_a_descriptor_does_not_depend_on_where_the_object_is() -> None:
     assert np.linalg.norm(describe(item) - describe(other)) < 0.05
 
 
-def test_size_and_colour_tell_objects_apart() -> None:
+def test_size_and_colour_distinguish_objects() -> None:
     small, large = box("box", (0, 0, 1), 0.1), box("box", (0, 0, 1), 0.3)
     red = cloud("box", small.xyz, rgb=np.tile(np.uint8([200, 20, 20]), (len(small), 1)))
     blue = cloud("box", small.xyz, rgb=np.tile(np.uint8([20, 20, 200]), (len(small), 1)))

@@ -304,7 +304,7 @@ def test_a_late_closure_joins_no_two_that_a_keyframe_shows_together() -> None:
     assert landmarks.joined([(first[0], first[0])], np.eye(3)) == {}
 
 
-def test_a_landmark_tells_the_robot_that_saw_it_last() -> None:
+def test_a_landmark_names_the_robot_that_saw_it_last() -> None:
     landmarks = Landmarks(PARAMS)
     _take(landmarks, _seen(1, CUP))
     (later,) = _seen(2, CUP, session=1)

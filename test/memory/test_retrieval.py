@@ -63,11 +63,11 @@ def test_odometry_takes_out_what_cannot_be_there_in_the_same_session_only() -> N
     assert [candidate.keyframe_id for candidate in wide.query(_seen(9, 30, CUP))] == [1]
 
 
-@pytest.mark.parametrize("told", [(False, False), (True, False), (False, True)])
-def test_our_own_tracking_takes_out_nothing(told: tuple[bool, bool]) -> None:
+@pytest.mark.parametrize("carried", [(False, False), (True, False), (False, True)])
+def test_our_own_tracking_takes_out_nothing(carried: tuple[bool, bool]) -> None:
     params = PARAMS.replaced(odometry_radius=1.0, odometry_drift=0.1)
-    index = _index(_seen(1, 0, CUP, x=8.0, by_odometry=told[0]), params=params)
-    assert [candidate.keyframe_id for candidate in index.query(_seen(9, 30, CUP, by_odometry=told[1]))] == [1]
+    index = _index(_seen(1, 0, CUP, x=8.0, by_odometry=carried[0]), params=params)
+    assert [candidate.keyframe_id for candidate in index.query(_seen(9, 30, CUP, by_odometry=carried[1]))] == [1]
 
 
 def test_an_object_of_another_size_or_colour_gets_a_lower_vote() -> None:

@@ -207,15 +207,15 @@ def test_sessions_that_may_have_reached_a_moment_are_those_up_to_the_last_that_d
     assert store.sessions_beyond("robot1", 3, 0) == frozenset()
 
 
-def test_sessions_of_keyframers_elsewhere_are_told_by_their_origin() -> None:
+def test_sessions_of_keyframers_elsewhere_are_known_by_their_origin() -> None:
     store = Store()
     for number, (seconds, session, origin) in enumerate(
         ((5.0, 3, "a/0"), (7.0, 3, "a/0"), (6.0, 4, "a/1"), (9.0, 5, ""))
     ):
         written = replace(keyframe(number + 1, seconds, session=session), robot="robot1", origin=origin)
         store.write_keyframe(written, sightings_of(written))
-    told = store.origins()
-    assert told == {"a/0": (3, 7 * 10**9), "a/1": (4, 6 * 10**9)}
+    known = store.origins()
+    assert known == {"a/0": (3, 7 * 10**9), "a/1": (4, 6 * 10**9)}
 
 
 def test_clearing_forgets_all_but_the_ids() -> None:
