@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames that pass every check of a word and that no camera ever sent, through every kernel of the registrar.
+"""Frames that pass every check of a data type and that no camera ever sent, through every kernel of the registrar.
 
 A program of its own: kernels look at indices only where a process begins with ``OBJREG_CHECKED=1``, which is slower.
 Prints how many places were tried; an index beside its array is an IndexError, and its exit status 1.
@@ -56,7 +56,7 @@ def strewn(scale: float, share: float) -> Spoil:
 
 
 def beyond(name: str, value: float) -> Spoil:
-    """Every third number of every object beyond all measure; a word refuses it."""
+    """Every third number of every object beyond all measure; the data type refuses it."""
 
     def spoil(rng: np.random.Generator, frame: Frame) -> Frame:
         def of(cloud: ObjectCloud) -> ObjectCloud:

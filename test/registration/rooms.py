@@ -57,7 +57,7 @@ def cast(T_world_camera: Array, boxes: tuple = ROOM) -> tuple[Array, Array, Arra
 
 
 def shade(points: Array) -> Array:
-    """A grey pattern fixed to the world, fine enough to tell places apart."""
+    """A grey pattern fixed to the world, fine enough to distinguish places."""
     x, y, z = np.moveaxis(points, -1, 0)
     waves = np.sin(23.0 * x + 3.0 * z) + np.sin(17.0 * y - 5.0 * x) + np.sin(19.0 * z + 11.0 * y) + np.sin(41.0 * x * y)
     return np.asarray(np.clip(128.0 + 28.0 * waves, 0, 255), np.uint8)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small made-up words for the tests of this room."""
+"""Small made-up keyframes and candidates for the tests of registration."""
 
 from __future__ import annotations
 

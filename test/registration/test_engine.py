@@ -65,7 +65,7 @@ def test_a_pose_is_brought_to_where_gravity_is_kept_as_far_as_that_is_known(monk
     assert spreads[0] < spreads[1]
 
 
-def test_what_is_told_besides_makes_the_whole_covariance_smaller_and_leaves_a_covariance_of_the_warp(
+def test_what_is_said_besides_makes_the_whole_covariance_smaller_and_leaves_a_covariance_of_the_warp(
     engine: Engine,
 ) -> None:
     systematic_depth_error, added = (
@@ -109,7 +109,7 @@ def test_what_else_a_lone_objects_pose_could_be_is_a_competitor_unless_it_comes_
 
 
 @pytest.mark.parametrize(("yaw_known", "silhouette_score", "left"), [(True, 1.0, 0), (False, 1.0, 1), (True, -1.0, 1)])
-def test_an_object_that_tells_its_yaw_and_looks_alike_takes_away_the_degenerate_direction(
+def test_an_object_that_shows_its_yaw_and_looks_alike_takes_away_the_degenerate_direction(
     yaw_known: bool, silhouette_score: float, left: int
 ) -> None:
     one = candidate(yaw_known=yaw_known, silhouette_score=silhouette_score, degenerate=np.eye(6)[:1])

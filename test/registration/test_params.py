@@ -43,8 +43,8 @@ def test_the_node_s_other_values_are_checked_too() -> None:
 
 
 def test_robots_are_namespaces_with_cameras_behind_them() -> None:
-    told = RegistrarNodeParams(robots=("r1 front rear", "fleet/r2", ". left"))
-    assert told.cameras == {"r1": ("front", "rear"), "fleet/r2": (), "": ("left",)}
+    params = RegistrarNodeParams(robots=("r1 front rear", "fleet/r2", ". left"))
+    assert params.cameras == {"r1": ("front", "rear"), "fleet/r2": (), "": ("left",)}
     assert RegistrarNodeParams().cameras == {}
 
 

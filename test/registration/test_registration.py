@@ -58,7 +58,7 @@ def test_without_a_candidate_the_reason_says_so_and_there_is_nothing_else() -> N
     assert refused.evidence == {} and refused.candidate is None
 
 
-def test_a_refusal_tells_the_evidence_of_the_best_candidate_and_gives_no_pose() -> None:
+def test_a_refusal_gives_the_evidence_of_the_best_candidate_and_gives_no_pose() -> None:
     best = candidate(violations=0.4)
     refused = align(HERE, THERE, method=Fixed(best))
     assert refused.reason == Reason.FREE_SPACE and refused.T_1_2 is None and refused.covariance is None

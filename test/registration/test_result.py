@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The word that a registration gives."""
+"""What a registration gives."""
 
 from __future__ import annotations
 

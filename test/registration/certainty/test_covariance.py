@@ -127,7 +127,7 @@ def test_a_pose_that_the_views_like_less_or_that_fits_worse_is_known_less(monkey
     assert variances == pytest.approx([2e-3, 2e-3 * np.e, 4e-3], rel=1e-3)
 
 
-def test_the_file_that_tells_of_the_calibration_holds_the_values_of_the_code(repository: Path) -> None:
+def test_the_file_that_states_the_calibration_holds_the_values_of_the_code(repository: Path) -> None:
     text = (repository / "config" / "covariance.yaml").read_text(encoding="utf-8")
     values = dict(re.findall(r"^    (\w+): ([\d.]+)$", text, re.MULTILINE))
     assert values.keys() == {"covariance_scale", "covariance_calibration"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What gravity tells of a pose."""
+"""What gravity says of a pose."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_pose_that_is_known_stays() -> None:
     assert pose_error(found[0], tilted_about_what_was_seen())[0] < 0.03 * np.degrees(TILT)
 
 
-def test_gravity_that_one_view_told_hardly_counts() -> None:
+def test_gravity_of_little_weight_hardly_counts() -> None:
     much, little = (
         gravity_update(*(seen(UP, weight=weight) for _ in range(2)), tilted_about_what_was_seen(), spread())
         for weight in (1.0, 0.05)
@@ -75,7 +75,7 @@ def test_gravity_says_nothing_of_a_turn_about_itself() -> None:
 
 
 @pytest.mark.parametrize("weights", [(0.2, 1.0), (1.0, 0.2)])
-def test_what_is_told_is_as_doubtful_as_both_gravities_together(weights: tuple[float, float]) -> None:
+def test_what_is_said_is_as_doubtful_as_both_gravities_together(weights: tuple[float, float]) -> None:
     found = gravity_update(*(seen(UP, weight=weight) for weight in weights), TRUE, spread())
     assert found is not None
     across = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
@@ -83,7 +83,7 @@ def test_what_is_told_is_as_doubtful_as_both_gravities_together(weights: tuple[f
 
 
 @pytest.mark.parametrize("ups", [(None, UP), (UP, None)])
-def test_gravity_that_is_unknown_tells_nothing(ups: tuple[np.ndarray | None, np.ndarray | None]) -> None:
+def test_gravity_that_is_unknown_says_nothing(ups: tuple[np.ndarray | None, np.ndarray | None]) -> None:
     assert gravity_update(*(seen(up) for up in ups), TRUE, spread()) is None
 
 
@@ -104,7 +104,7 @@ def test_where_gravity_is_unknown_a_camera_is_held_upright_more_or_less() -> Non
 
 
 @pytest.mark.parametrize("unknown", ["source", "target"])
-def test_without_gravity_nothing_is_told(unknown: str) -> None:
+def test_without_gravity_nothing_is_said(unknown: str) -> None:
     views = [seen(None if unknown == name else UP) for name in ("source", "target")]
     assert gravity_update(*views, TRUE, spread()) is None
 

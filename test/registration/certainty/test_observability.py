@@ -91,11 +91,11 @@ def test_a_position_that_views_with_grey_hold_is_known_better_and_one_without_is
 def test_what_views_say_of_a_direction_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
     C = np.diag([0.2**2, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8])
     grey = [prepare(keyframe(seen_from(a), TABLE, seed=k), PARAMS) for k, a in enumerate((0.0, 20.0))]
-    told = []
+    regularising = []
     for sigma in (0.1, 1e-3):  # of the smaller they are asked on and on
         monkeypatch.setattr(observability, "DOUBTFUL_SIGMA_M", sigma)
-        told.append(regularising_information(*grey, TRUTH, C)[0, 0])
-    assert told[0] > 0.0 and told[1] == pytest.approx(told[0], rel=0.05)
+        regularising.append(regularising_information(*grey, TRUTH, C)[0, 0])
+    assert regularising[0] > 0.0 and regularising[1] == pytest.approx(regularising[0], rel=0.05)
 
 
 def test_nothing_is_held_by_a_perturbation_that_is_longer_than_may_steady(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -141,5 +141,5 @@ def test_a_patch_aside_may_lie_off_by_the_share_of_its_distance(monkeypatch: pyt
 def test_a_camera_with_twice_the_noise_knows_a_pose_half_as_well_and_a_quiet_one_no_better() -> None:
     xyz, normals = (part.astype(np.float32) for part in corner(0.05))
     surface = grid_of(xyz, normals)
-    told = [sigma(information(xyz, normals, surface, np.eye(4), (noise, noise))) for noise in (0.3, 1.0, 2.0)]
-    assert np.allclose(told[0], told[1]) and np.allclose(told[2], 2.0 * told[1], rtol=0.01)
+    sigmas = [sigma(information(xyz, normals, surface, np.eye(4), (noise, noise))) for noise in (0.3, 1.0, 2.0)]
+    assert np.allclose(sigmas[0], sigmas[1]) and np.allclose(sigmas[2], 2.0 * sigmas[1], rtol=0.01)

@@ -22,7 +22,7 @@ def test_a_motion_is_plausible_up_to_a_distance() -> None:
     assert odometry.check_plausible(moved(3.0, 4.0), 4.9) == (Reason.IMPLAUSIBLE_MOTION, "5.00 m > 4.90 m")
 
 
-def test_a_pose_without_a_prior_passes_and_one_beyond_it_is_told_with_both_limits() -> None:
+def test_a_pose_without_a_prior_passes_and_one_beyond_it_is_refused_with_both_limits() -> None:
     assert odometry.check(moved(9.0), None, 4.0) is None
     refusal = odometry.check(moved(0.0), _prior(0.3), 4.0)
     assert refusal == (Reason.ODOMETRY, "0.0 deg 30 cm from odometry, expected 4.0 deg 20 cm at most")

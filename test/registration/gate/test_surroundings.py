@@ -75,7 +75,7 @@ def test_few_objects_around_which_the_print_agrees_much_less_have_moved(
 ) -> None:
     def judged(around: float | None, whole: float | None = 0.6) -> object:
         seen = replace(candidate().verification, correlation=whole)
-        told = {
+        evidence = {
             "matched": matched,
             "agreeing_proposers": proposers,
             "score_margin": 1.0,
@@ -83,7 +83,7 @@ def test_few_objects_around_which_the_print_agrees_much_less_have_moved(
             "silhouette_score": 0.9,
         }
         surroundings = replace(seen, correlation=around)
-        return refuse(candidate(**told, correlation=whole, perturbation_margin=1.0, surroundings=surroundings))
+        return refuse(candidate(**evidence, correlation=whole, perturbation_margin=1.0, surroundings=surroundings))
 
     assert judged(0.6 - 0.9 * GATE.surroundings.correlation_loss) is None
     assert judged(0.99) is None
@@ -98,8 +98,8 @@ def test_a_lone_object_whose_surroundings_score_little_has_moved_whoever_propose
 ) -> None:
     def judged(score: float, *matched: ObjectPair) -> object:
         around = replace(candidate().verification, score=score)
-        told = {"score_margin": 1.0, "perturbation_margin": 1.0, "yaw_known": True}
-        return refuse(candidate(matched=matched, agreeing_proposers=proposers, surroundings=around, **told))
+        evidence = {"score_margin": 1.0, "perturbation_margin": 1.0, "yaw_known": True}
+        return refuse(candidate(matched=matched, agreeing_proposers=proposers, surroundings=around, **evidence))
 
     least = GATE.surroundings.score
     assert judged(least + 0.01, CUP) is None and judged(least - 0.01, CUP, CUP) is None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verdict: which candidate is accepted, and whose refusal is told."""
+"""The verdict: which candidate is accepted, and whose refusal is given."""
 
 from __future__ import annotations
 

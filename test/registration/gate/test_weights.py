@@ -34,7 +34,7 @@ def test_no_kind_of_evidence_alone_makes_a_pose_likely() -> None:
 
 
 def test_the_reference_says_what_each_kind_weighs() -> None:
-    told = (Path(__file__).parents[3] / "docs" / "gate.md").read_text()
+    reference = (Path(__file__).parents[3] / "docs" / "gate.md").read_text()
     for name, weights in WEIGHTS.items():
-        (row,) = (line for line in told.splitlines() if line.startswith(f"| `{name}` |"))
+        (row,) = (line for line in reference.splitlines() if line.startswith(f"| `{name}` |"))
         assert f"| {min(weights):+.2f} … {max(weights):+.2f} |" in row, "make docs/gate.md as gate/weights.py is"

@@ -30,7 +30,7 @@ def test_every_object_has_a_shape_and_a_middle_and_all_of_them_one_together() ->
     assert ready.scene is not None and None not in ready.shapes
 
 
-def test_what_is_told_of_single_objects_is_made_once_and_when_it_is_asked_for() -> None:
+def test_what_is_known_of_single_objects_is_made_once_and_when_it_is_asked_for() -> None:
     asked: list[int] = []
     things = AtNeed(3, lambda k: (asked.append(k), 10 * k)[1])
     assert len(things) == 3 and asked == []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tells two poses apart: neither what is hidden, nor that an object looks alike."""
+"""What distinguishes two poses: neither what is hidden, nor that an object looks alike."""
 
 from __future__ import annotations
 
@@ -78,9 +78,9 @@ def test_a_pose_is_perturbed_where_surfaces_or_a_warped_depth_leave_it_doubtful(
 
 
 @pytest.mark.parametrize(("here", "there"), [(True, True), (True, False), (False, True)])
-def test_a_yaw_is_known_where_the_object_tells_it_in_both_views(here: bool, there: bool) -> None:
+def test_a_yaw_is_known_where_the_object_shows_it_in_both_views(here: bool, there: bool) -> None:
     ready = prepare(rooms.keyframe(rooms.seen_from(0.0)), PARAMS)
-    views = (replace(ready, yaw_known=(told,) * len(ready.yaw_known)) for told in (here, there))
+    views = (replace(ready, yaw_known=(known,) * len(ready.yaw_known)) for known in (here, there))
     found = gather(*views, candidate().alignment, ("features",))
     assert found.matched and found.yaw_known is (here and there)
 
@@ -96,8 +96,8 @@ def test_the_views_are_asked_without_the_objects_where_those_are_few(monkeypatch
     source: Any = SimpleNamespace(sight="a", own=(first, second, first))
     target: Any = SimpleNamespace(sight="b", own=(second, first, first))
     cup, book, can = ObjectPair(0, 1, "cup"), ObjectPair(1, 0, "book"), ObjectPair(2, 2, "soda can")
-    for matched, told in (((cup,), "without"), ((cup, book), "without"), ((cup, book, can), None), ((), None)):
-        assert surroundings_of(candidate(matched=matched), source, target) == told
+    for matched, expected in (((cup,), "without"), ((cup, book), "without"), ((cup, book, can), None), ((), None)):
+        assert surroundings_of(candidate(matched=matched), source, target) == expected
     for (*views, own, T), pixels in zip(asked, ((first, first), (both, both)), strict=True):
         assert views == ["a", "b"] and np.array_equal(own, pixels)
         assert np.array_equal(T, candidate().T_target_source)

@@ -133,7 +133,7 @@ def test_without_gravity_or_objects_on_either_side_objects_propose_nothing(
     assert CHAINS[proposer](pair[0], pair[1]) == []
 
 
-def test_the_middle_of_a_lone_object_tells_no_pose(lone: tuple[Prepared, Prepared]) -> None:
+def test_the_middle_of_a_lone_object_gives_no_pose(lone: tuple[Prepared, Prepared]) -> None:
     assert from_centroids(*lone) == []
 
 

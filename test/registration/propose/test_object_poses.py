@@ -28,7 +28,7 @@ THREE = {"box": beside(BOX, -0.1, 0.22), "ell": beside(ELL, 0.1, -0.15), "can": 
 
 
 @pytest.mark.parametrize("angle", [40.0, 150.0])
-def test_three_objects_tell_the_whole_pose(angle: float) -> None:
+def test_three_objects_give_the_whole_pose(angle: float) -> None:
     source = prepare(keyframe(from_side(angle), THREE, seed=1), PARAMS)
     target = prepare(keyframe(from_side(0.0), THREE, seed=2), PARAMS)
     degrees, centimetres = error(register_scenes(source, target)[0].T_target_source, angle, 0.0)

@@ -53,7 +53,7 @@ def standing(source, target, normals) -> Matches:
 
 
 def test_a_baseline_that_stands_upright_in_one_frame_gives_no_pose() -> None:
-    """It tells no turn about gravity, however little its length differs from that of a slanted one."""
+    """It shows no turn about gravity, however little its length differs from that of a slanted one."""
     leaning = standing([[0, 0, 0], [0.25, 0, 0.4]], [[0, 0, 0], [0, 0, 0.45]], None)
     assert poses(leaning, UP, UP, 0.06, 0.3, 5) == ()
 

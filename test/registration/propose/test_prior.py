@@ -66,7 +66,7 @@ def test_what_is_expected_is_as_uncertain_whichever_of_the_two_came_first() -> N
 
 @pytest.mark.parametrize(("source", "target"), [(True, True), (True, False), (False, True)])
 def test_odometry_is_trusted_where_it_carried_both_keyframes(source: bool, target: bool) -> None:
-    pair = (replace(keyframe(k), by_odometry=told) for k, told in enumerate((source, target)))
+    pair = (replace(keyframe(k), by_odometry=tracked) for k, tracked in enumerate((source, target)))
     prior = expect(*pair, PARAMS)
     assert prior is not None and prior.trusted is (source and target)
 

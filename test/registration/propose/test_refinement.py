@@ -53,7 +53,7 @@ def test_a_pattern_that_does_not_correlate_holds_nothing() -> None:
     assert len(refine(*views, settle(*views, np.eye(4)[None])[0][0]).degenerate) == 3
 
 
-def test_what_settles_on_nothing_is_told_from_what_the_shape_holds(pair) -> None:
+def test_what_settles_on_nothing_is_distinguished_from_what_the_shape_holds(pair) -> None:
     far = pose(np.eye(3), np.array([50.0, 0.0, 0.0]))
     _, held = settle(*pair, np.array([OFF @ TRUTH, far]))
     assert held.tolist() == [True, False]

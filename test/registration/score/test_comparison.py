@@ -51,7 +51,7 @@ def test_where_grey_says_little_objects_have_their_whole_say(correlation: float 
     assert score_gain(unlike, alike) == pytest.approx(0.05 - 0.5 * 0.6)
 
 
-def test_the_say_of_objects_falls_with_what_the_grey_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_say_of_objects_falls_with_what_the_grey_says(monkeypatch: pytest.MonkeyPatch) -> None:
     """The more points of grey, and the better it correlates: 1000 (1 - r^2) / (n r) of it is left."""
     alike, unlike = (scored(1.0, silhouette_score, correlation=0.5, points=3000) for silhouette_score in (1.0, 0.0))
     assert score_gain(alike, unlike) == pytest.approx(0.5 * 1000 * 0.75 / 1500)

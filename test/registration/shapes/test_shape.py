@@ -64,14 +64,14 @@ def test_a_rung_under_an_object_is_not_what_it_stands_on() -> None:
     assert abs(footing(replace(key, objects=(KeyObject(cloud=lifted),), context=upon), 0, R) - low) < 0.005
 
 
-def test_the_plane_under_an_object_tells_up_better_than_gravity() -> None:
+def test_the_plane_under_an_object_says_where_up_is_better_than_gravity() -> None:
     key = keyframe(from_side(20.0), {"box": BOX})
     truth = -np.asarray(key.gravity)
     guess = rotation_from_vector(np.radians([1.0, 0.0, 1.0])) @ truth
     assert standing(key, [0], guess) @ truth > np.cos(np.radians(0.1))
 
 
-def test_a_board_that_tilts_much_is_not_level_and_without_a_board_gravity_tells_up() -> None:
+def test_a_board_that_tilts_much_is_not_level_and_without_a_board_gravity_says_where_up_is() -> None:
     key = keyframe(from_side(20.0), {"box": BOX})
     guess = rotation_from_vector(np.radians([9.0, 0.0, 0.0])) @ -np.asarray(key.gravity)
     bare = replace(key, context=NOTHING)
@@ -127,7 +127,7 @@ def test_an_upright_motion_is_a_pose_and_back(angle: float) -> None:
     truth = inverse(from_side(0.0)) @ from_side(angle)
     motion = upright_motion(source, target, truth)
     degrees, centimetres = pose_error(upright_pose(source, target, motion), truth)
-    assert degrees < 0.05 and centimetres < 0.05  # as far as the two planes tell which way is up
+    assert degrees < 0.05 and centimetres < 0.05  # as far as the two planes show which way is up
     assert abs(motion[3]) < 0.003
 
 

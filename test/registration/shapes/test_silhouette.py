@@ -59,7 +59,7 @@ def test_every_pixel_knows_the_way_into_the_outline() -> None:
     assert not silhouette.inward[inside].any() and silhouette.inward[~inside].any(axis=-1).all()
 
 
-def test_the_edges_of_the_picture_are_told_from_those_of_the_window() -> None:
+def test_the_edges_of_the_picture_are_distinguished_from_those_of_the_window() -> None:
     whole = drawn({"box": BOX})
     wide = drawn({"box": (((0.0, -3.0, 0.0), (0.1, 3.0, 0.1)),)})
     assert not whole.edges.any()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of yaw that a shape does not tell."""
+"""Tests of yaw that a shape does not show."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def corner_of_a_box() -> ObjectCloud:
     return cloud(np.concatenate([front[0], side[0]]), np.concatenate([front[1], side[1]]))
 
 
-def test_a_can_does_not_tell_its_yaw() -> None:
+def test_a_can_does_not_show_its_yaw() -> None:
     assert yaw_share(half_can(), UP) < 0.01
 
 
-def test_noise_of_the_normals_does_not_make_a_can_tell_it() -> None:
+def test_noise_of_the_normals_does_not_make_a_can_show_it() -> None:
     assert yaw_share(half_can(0.1), UP) < 0.07
 
 
@@ -56,15 +56,15 @@ def test_a_cloud_without_normals_is_not_called_symmetric() -> None:
 
 
 def test_what_is_not_round_would_stand_in_seen_free_space_if_it_were_turned(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(symmetry, "TURN_SHARE", 1.0)  # no surface tells a yaw
+    monkeypatch.setattr(symmetry, "TURN_SHARE", 1.0)  # no surface shows a yaw
     for angle in (0.0, 70.0, 200.0):
-        for thing, told in ((ELL, True), ((0.0, 0.0), False)):
+        for thing, shown in ((ELL, True), ((0.0, 0.0), False)):
             seen = keyframe(from_side(angle), {"thing": thing})
             shape = prepare_shape(seen, [0], SHAPE_POINTS)
-            assert shape is not None and (turned_violations(shape) > 0.1) is told
-            assert shows_yaw(seen.objects[0].cloud, -np.asarray(seen.gravity), shape) is told
+            assert shape is not None and (turned_violations(shape) > 0.1) is shown
+            assert shows_yaw(seen.objects[0].cloud, -np.asarray(seen.gravity), shape) is shown
 
 
-def test_where_up_is_unknown_no_yaw_is_told() -> None:
+def test_where_up_is_unknown_no_yaw_is_shown() -> None:
     assert not shows_yaw(corner_of_a_box(), None, None)
     assert shows_yaw(corner_of_a_box(), UP, None)
