@@ -37,7 +37,7 @@ def test_turns_of_two_bodies_are_unlike() -> None:
     assert found.is_unlike and not found.is_alike and found.off > 0.5
 
 
-def test_small_turns_tell_nothing() -> None:
+def test_small_turns_say_nothing() -> None:
     small = random_motions(20, turn=0.005)
     found = likeness(small, carried(small))
     assert found.turns == 0 and not found.is_alike and not found.is_unlike
@@ -92,7 +92,7 @@ def turned(about_z: Array) -> Array:
     return pose(rotation_from_vector(turns), np.zeros(3))
 
 
-def test_turns_that_come_again_tell_no_shift() -> None:
+def test_turns_that_come_again_show_no_shift() -> None:
     noise = np.random.default_rng(6).normal(0, 0.005, len(FIRST_S))
     all_known = np.ones(len(FIRST_S), bool)
 

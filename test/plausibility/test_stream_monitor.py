@@ -122,7 +122,7 @@ def test_the_scale_of_right_depth_is_that_of_odometry(pictures: Pictures) -> Non
     assert monitor.proven and not monitor.findings and not monitor.disowned
 
 
-def test_a_camera_with_odometry_is_not_proven_before_that_tells_its_scale(pictures: Pictures) -> None:
+def test_a_camera_with_odometry_is_not_proven_before_that_shows_its_scale(pictures: Pictures) -> None:
     few = OWN[:4]
     assert watch(pictures).proven and not watch(pictures, samples=few).proven
 
@@ -158,7 +158,7 @@ def test_where_the_focal_length_stays_unknown_a_wrong_scale_is_found_by_the_stat
     assert all("or the focal length" in finding.cause for finding in monitor.findings)
 
 
-def test_without_odometry_nothing_tells_the_scale_of_depth(pictures: Pictures) -> None:
+def test_without_odometry_nothing_shows_the_scale_of_depth(pictures: Pictures) -> None:
     monitor = watch(pictures, scale=1.3)
     assert monitor.proven and not monitor.findings
 
