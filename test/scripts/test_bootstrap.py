@@ -132,9 +132,9 @@ def test_completion_is_installed_and_the_environment_sources_it_once(checkout: P
     for script in ("activate", "activate.fish"):
         assert (checkout / ".venv/bin" / script).read_text().count("# objreg: completion") == 1
     (environment / "bash-completion/completions/objreg").write_text("echo completes\n")
-    for shell, heard_there in (("bash", "completes\n"), ("sh", "")):
+    for shell, printed in (("bash", "completes\n"), ("sh", "")):
         sourced = f"set -eu; VIRTUAL_ENV={checkout / '.venv'}; . {activate}"
-        assert subprocess.run([shell, "-c", sourced], check=True, capture_output=True, text=True).stdout == heard_there
+        assert subprocess.run([shell, "-c", sourced], check=True, capture_output=True, text=True).stdout == printed
 
 
 def test_what_cannot_complete_is_no_obstacle(checkout: Path) -> None:

@@ -27,12 +27,12 @@ def pins(repository: Path, name: str) -> dict[str, str]:
 
 def wanted(repository: Path, *extras: str) -> dict[str, str]:
     """What setup.py asks for, each with its oldest version."""
-    told = {
+    asked = {
         node.arg: ast.literal_eval(node.value)
         for node in ast.walk(ast.parse((repository / "setup.py").read_text()))
         if isinstance(node, ast.keyword) and node.arg in ("install_requires", "extras_require")
     }
-    lines = [*told["install_requires"], *(line for extra in extras for line in told["extras_require"][extra])]
+    lines = [*asked["install_requires"], *(line for extra in extras for line in asked["extras_require"][extra])]
     return {name.replace("_", "-"): oldest for name, _, oldest in (line.partition(">=") for line in lines)}
 
 
