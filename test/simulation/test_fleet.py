@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stories of several robots: one world, one clock, shared places and different ways."""
+"""Plans of several robots: one world, one clock, shared places and different ways."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stories: what each scenario promises."""
+"""Recording plans: what each scenario promises."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SMALL = Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120
 
 
 def seen_on_the_first_table(plan: RecordingPlan, k: int) -> set[int]:
-    """Instances that frame ``k`` shows and that stand at the first place of the story."""
+    """Instances that frame ``k`` shows and that stand at the first place of the plan."""
     scene = plan.scenes[plan.scene_of[k]]
     place = scene.places[0]
     seen = render(scene, plan.T_world_camera[k], SMALL, with_colour=False).seen
@@ -35,7 +35,7 @@ def seen_on_the_first_table(plan: RecordingPlan, k: int) -> set[int]:
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_a_story_moves_at_the_speed_of_a_hand(scenario: str) -> None:
+def test_a_plan_moves_at_the_speed_of_a_hand(scenario: str) -> None:
     plan = make_plan(scenario, 0, frames=60)
     moved, turned = speeds(plan.T_world_camera, plan.rate)
     assert moved.max() < 0.55 and turned.max() < 45.0

@@ -37,7 +37,7 @@ def scene(*objects: Placed) -> Scene:
 
 BEFORE = scene(*(placed(k, label, 0.1 * k) for k, label in enumerate(KINDS, start=1)))
 AFTER = scene(placed(1, "book", 3.0))
-STORY = RecordingPlan((BEFORE, AFTER), np.array([0, 1]), np.tile(np.eye(4), (2, 1, 1)), 30.0)
+PLAN = RecordingPlan((BEFORE, AFTER), np.array([0, 1]), np.tile(np.eye(4), (2, 1, 1)), 30.0)
 T_WORLD_CAMERA = pose(rotation_from_vector(np.array([0.4, -1.0, 0.3])), np.array([1.0, 2.0, 3.0]))
 
 
@@ -56,8 +56,8 @@ def rendering(*seen: Placed) -> Rendering:
     return Rendering(nothing, nothing, None, instance, tuple(sights), T_WORLD_CAMERA, CAMERA)
 
 
-def written(recording: Path, plan: RecordingPlan = STORY, *images: Rendering) -> SimulationTruth:
-    """The truth of a story, written and read again; by default of two frames, with the book in both."""
+def written(recording: Path, plan: RecordingPlan = PLAN, *images: Rendering) -> SimulationTruth:
+    """The truth of a plan, written and read again; by default of two frames, with the book in both."""
     writer = TruthWriter(plan, "loop", 7, CAMERA)
     for k, image in enumerate(images or (rendering(*BEFORE.objects[:2]), rendering(*AFTER.objects))):
         writer.write_frame(STAMPS[k], int(plan.scene_of[k]), image)
@@ -132,7 +132,7 @@ def test_an_empty_scene_has_a_truth_too(tmp_path: Path) -> None:
     assert truth.objects == ({},) and truth.frames[0].seen == () and not truth.mask(STAMPS[0]).any()
 
 
-def test_the_same_story_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_the_same_plan_gives_the_same_bytes(tmp_path: Path) -> None:
     folders = [written(tmp_path / name).folder for name in ("a", "b")]
     for name in (FRAMES, MASKS):
         first, second = ((folder / name).read_bytes() for folder in folders)

@@ -18,7 +18,7 @@ def test_a_look_goes_about_the_table_from_its_start_to_its_stop() -> None:
     assert all(np.array_equal(point.target, centre) for point in points)
 
 
-def test_a_look_at_random_sweeps_as_far_as_it_is_told() -> None:
+def test_a_look_at_random_sweeps_as_far_as_it_is_given() -> None:
     look = CameraLook.at_random(np.random.default_rng(0), 10.0, -40.0)
     assert (look.start, look.stop) == (10.0, -30.0) and 1.0 < look.radius < 1.35
 

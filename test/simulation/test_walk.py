@@ -16,14 +16,14 @@ PLAIN = WalkParams()
 LYING = WalkParams(false_share=0.2, agreeing_share=0.1)
 
 
-def error(of: Walk, word: LoopClosure) -> np.ndarray:
+def error(of: Walk, closure: LoopClosure) -> np.ndarray:
     """What a closure says beside the truth, (4, 4) in the axes of *to*."""
-    a, b = (of.T_world_body[stamp // PERIOD_NS] for stamp in (word.from_ns, word.to_ns))
-    return inverse(inverse(a) @ b) @ word.T_from_to
+    a, b = (of.T_world_body[stamp // PERIOD_NS] for stamp in (closure.from_ns, closure.to_ns))
+    return inverse(inverse(a) @ b) @ closure.T_from_to
 
 
 def lies(of: Walk) -> list[LoopClosure]:
-    return [word for word, is_false in zip(of.closures, of.is_false, strict=True) if is_false]
+    return [closure for closure, is_false in zip(of.closures, of.is_false, strict=True) if is_false]
 
 
 def test_a_seed_is_a_walk_and_another_is_another() -> None:
@@ -54,15 +54,15 @@ def test_a_body_goes_through_corridors_by_steps_of_one_length() -> None:
 def test_odometry_wanders_step_by_step_as_its_sigmas_say() -> None:
     of = walk(WalkParams(poses=4000, drift_m=0.03, drift_deg=2.0), 0)
     errors = []
-    told = [word.T_odom_body for word in of.odometry]
-    for (a, b), (true_a, true_b) in zip(pairwise(told), pairwise(of.T_world_body), strict=True):
+    poses = [sample.T_odom_body for sample in of.odometry]
+    for (a, b), (true_a, true_b) in zip(pairwise(poses), pairwise(of.T_world_body), strict=True):
         motion, true = inverse(a) @ b, inverse(true_a) @ true_b
         way = np.linalg.norm(true[:3, 3]) + np.linalg.norm(vector_from_rotation(true[:3, :3]))
         wrong = inverse(true) @ motion
         errors.append(np.concatenate([wrong[:3, 3], vector_from_rotation(wrong[:3, :3])]) / np.sqrt(way / 3))
     spread = np.std(errors, axis=0)
     np.testing.assert_allclose(spread, np.repeat([0.03, np.radians(2.0)], 3), rtol=0.06)
-    assert [word.stamp_ns for word in of.odometry[:3]] == [0, PERIOD_NS, 2 * PERIOD_NS]
+    assert [sample.stamp_ns for sample in of.odometry[:3]] == [0, PERIOD_NS, 2 * PERIOD_NS]
 
 
 def test_what_is_steadily_wrong_is_a_stretch_and_a_turn_with_the_way() -> None:
@@ -73,7 +73,7 @@ def test_what_is_steadily_wrong_is_a_stretch_and_a_turn_with_the_way() -> None:
     assert np.linalg.norm(motion[:3, 3]) == pytest.approx(1.1 * PLAIN.step_m)
     assert pose_error(motion, true)[0] == pytest.approx(2.0 * PLAIN.step_m, rel=1e-6)
     exact = walk(WalkParams(poses=10, **still), 0)
-    np.testing.assert_allclose([word.T_odom_body for word in exact.odometry], exact.T_world_body, atol=1e-9)
+    np.testing.assert_allclose([sample.T_odom_body for sample in exact.odometry], exact.T_world_body, atol=1e-9)
 
 
 def test_right_closures_are_of_places_met_again_and_as_good_as_they_claim() -> None:
@@ -81,14 +81,14 @@ def test_right_closures_are_of_places_met_again_and_as_good_as_they_claim() -> N
     for seed in range(8):
         of = walk(PLAIN, seed)
         assert not of.is_false.any() and len(of.closures) <= PLAIN.closures
-        for word in of.closures:
-            a, b = word.from_ns // PERIOD_NS, word.to_ns // PERIOD_NS
+        for closure in of.closures:
+            a, b = closure.from_ns // PERIOD_NS, closure.to_ns // PERIOD_NS
             assert b - a >= APART
             assert np.linalg.norm(of.T_world_body[a, :3, 3] - of.T_world_body[b, :3, 3]) <= NEAR_M
-            wrong = error(of, word)
+            wrong = error(of, closure)
             errors.append(np.concatenate([wrong[:3, 3], vector_from_rotation(wrong[:3, :3])]))
             expected = np.repeat([PLAIN.sigma_m, np.radians(PLAIN.sigma_deg)], 3)
-            np.testing.assert_allclose(np.sqrt(np.diag(word.covariance)), expected)
+            np.testing.assert_allclose(np.sqrt(np.diag(closure.covariance)), expected)
     np.testing.assert_allclose(np.std(errors, axis=0), expected, rtol=0.2)
 
 
@@ -96,17 +96,15 @@ def test_right_closures_are_of_places_met_again_and_as_good_as_they_claim() -> N
 def test_lies_have_their_share_of_all(false: float, agreeing: float) -> None:
     of = walk(WalkParams(false_share=false, agreeing_share=agreeing), 2)
     assert np.mean(of.is_false) == pytest.approx(false + agreeing, abs=0.02)
-    assert [word.to_ns for word in of.closures] == sorted(word.to_ns for word in of.closures)
+    assert [closure.to_ns for closure in of.closures] == sorted(closure.to_ns for closure in of.closures)
 
 
 def test_lies_are_of_any_size_and_as_sure_as_they_like() -> None:
     found = [
-        (walk_, word)
-        for walk_ in (walk(WalkParams(false_share=0.4), seed) for seed in range(6))
-        for word in lies(walk_)
+        (walk_, lie) for walk_ in (walk(WalkParams(false_share=0.4), seed) for seed in range(6)) for lie in lies(walk_)
     ]
-    metres = np.array([np.linalg.norm(error(of, word)[:3, 3]) for of, word in found])
-    sigmas = np.sqrt([word.covariance[0, 0] for _, word in found])
+    metres = np.array([np.linalg.norm(error(of, lie)[:3, 3]) for of, lie in found])
+    sigmas = np.sqrt([lie.covariance[0, 0] for _, lie in found])
     assert metres.min() >= 0.1 - 1e-9 and metres.max() <= 1e9 * (1 + 1e-9)
     assert np.percentile(metres, 25) < 100.0 and np.percentile(metres, 75) > 1e5
     assert sigmas.min() >= LEAST_SIGMA * (1 - 1e-9) and sigmas.max() <= 2e-2 * (1 + 1e-9)
@@ -117,10 +115,10 @@ def test_lies_that_agree_put_one_place_at_one_other() -> None:
     of = walk(WalkParams(agreeing_share=0.2, lie_m=(1.0, 5.0)), 1)
     T = of.T_world_body
     wrong = []
-    for word in lies(of):
-        a, b = word.from_ns // PERIOD_NS, word.to_ns // PERIOD_NS
-        wrong.append(T[a] @ word.T_from_to @ inverse(T[b]))
-        assert word.from_ns < word.to_ns
+    for lie in lies(of):
+        a, b = lie.from_ns // PERIOD_NS, lie.to_ns // PERIOD_NS
+        wrong.append(T[a] @ lie.T_from_to @ inverse(T[b]))
+        assert lie.from_ns < lie.to_ns
     assert len(wrong) > 3
     for one in wrong[1:]:
         np.testing.assert_allclose(one, wrong[0], atol=1e-6)

@@ -94,7 +94,7 @@ def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_camera_info_of_a_lens_has_its_distortion_and_the_stamps_do_not_tell_the_lag(bent: Path) -> None:
+def test_the_camera_info_of_a_lens_has_its_distortion_and_the_stamps_do_not_show_the_lag(bent: Path) -> None:
     stamps: dict[str, list[int]] = {}
     with open_recording(bent) as recording:
         for record in recording.records(["/image", "/depth/image", "/camera_info"]):
@@ -130,7 +130,7 @@ def test_a_rig_changes_the_pictures_and_not_the_truth(recorded: Path, bent: Path
 
 @pytest.fixture(scope="module")
 def of_robots(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """The same story of two robots, of which the second begins seven seconds later."""
+    """The same plan of two robots, of which the second begins seven seconds later."""
     plan, folder = make_plan("orbit", 1, frames=2), tmp_path_factory.mktemp("robots")
     for robot, start_ns in (("robot1", 0), ("robot2", 7 * 10**9)):
         write_plan(folder / robot, replace(plan, robot=robot, start_ns=start_ns), "orbit", 1, SMALL, points=True)

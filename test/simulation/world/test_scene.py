@@ -75,7 +75,7 @@ def test_a_scene_of_chosen_classes_has_no_others() -> None:
     assert {o.label for o in scene.objects} <= {"soda_can", "bowl"} and scene.objects
 
 
-def test_distractors_are_told_from_the_nine_classes() -> None:
+def test_distractors_are_distinguished_from_the_nine_classes() -> None:
     scene = random_scene(7)
     assert all(o.is_distractor == (o.label not in LABELS) for o in scene.objects)
     assert [o.instance for o in scene.objects] == list(range(1, len(scene.objects) + 1))
