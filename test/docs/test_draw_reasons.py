@@ -58,14 +58,14 @@ def test_a_pair_without_a_pose_or_without_a_picture_is_not_drawn() -> None:
 
 
 def test_a_section_names_what_stands_behind_a_reason() -> None:
-    told = section(
+    written = section(
         "late", ReasonText("it came late", "Wait.", ("segmenter.slop",), (("data/frames.py", "JUMP_NS"),)), "", "1 > 0"
     )
     assert (
         "It came late. Wait. Behind it: [`segmenter.slop`](parameters.md#segmenter), `JUMP_NS` in `data/frames.py`."
-        in told
+        in written
     )
-    assert "![A pair refused as late](pictures/late.jpg)" in told and "*1 > 0*" in told
+    assert "![A pair refused as late](pictures/late.jpg)" in written and "*1 > 0*" in written
 
 
 def test_a_page_without_a_place_for_the_reference_is_refused(tmp_path: Path) -> None:
