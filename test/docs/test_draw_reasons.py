@@ -28,7 +28,7 @@ class Wall:
         return DepthImage(depth=depth, rgb=rgb, intrinsics=CAMERA, stamp_ns=stamp_ns) if stamp_ns else None
 
 
-def test_the_reference_in_the_page_is_made_of_the_words_of_now() -> None:
+def test_the_reference_in_the_page_is_made_of_the_texts_of_now() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert with_reference(page, details()) == page, "run python -m docs.draw_reasons"
 

@@ -89,7 +89,7 @@ def test_what_is_forgotten_is_not_carried_on() -> None:
     assert taught(20).update(T, T[:3, :3].T @ DOWN, 1.0)[1] > 0.5
 
 
-def test_a_view_that_tells_nothing_is_told_by_those_before_it() -> None:
+def test_a_view_that_tells_nothing_is_closed_by_those_before_it() -> None:
     gravity_filter, T = taught(10), camera(110.0)
     found, weight = gravity_filter.update(T, None, 0.0)
     assert found is not None and error_deg(found, T) < 1e-6

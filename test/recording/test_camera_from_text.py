@@ -39,7 +39,7 @@ def test_the_camera_that_is_given_takes_the_place_of_any_other_in_the_size_of_th
         assert {record.topic for record in source.records()} == source.topics.keys()
 
 
-def test_without_a_word_the_recording_is_what_it_was(tmp_path: Path) -> None:
+def test_without_a_text_the_recording_is_what_it_was(tmp_path: Path) -> None:
     with open_recording(tum_folder(tmp_path / "tum")) as opened:
         assert with_camera(opened, "") is opened
 

@@ -34,7 +34,7 @@ def test_the_recording_of_a_run_gives_truth_and_pictures(tmp_path: Path, shared:
     assert "<h1>redkitchen_a</h1>" in text and text.count("data:image/webp") >= 12
 
 
-def test_the_json_of_a_live_run_is_told_by_the_odometry_of_its_recording(tmp_path: Path) -> None:
+def test_the_json_of_a_live_run_is_closed_by_the_odometry_of_its_recording(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", records(30))
     counters = {"published": 29, "stage_ms": {"segment": [3.0, 5.0]}}
     told = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}, "nodes": {"segmenter": counters}}

@@ -82,7 +82,7 @@ def test_what_gets_through_now_and_then_makes_no_flicker() -> None:
     assert seen[5:] == [True] * 75
 
 
-def test_of_several_inputs_each_is_told_by_itself() -> None:
+def test_of_several_inputs_each_is_closed_by_itself() -> None:
     drops, clock = made()
     for second in range(7):
         clock.now = float(second)

@@ -56,7 +56,7 @@ def test_a_recording_without_records_begins_at_no_time(tmp_path: Path) -> None:
     assert "0.00 s, 0 records" in output and "UTC" not in output
 
 
-def test_a_topic_of_two_types_is_told_by_its_more_frequent_one(tmp_path: Path) -> None:
+def test_a_topic_of_two_types_is_closed_by_its_more_frequent_one(tmp_path: Path) -> None:
     types = standard_types()
     image = messages.image(np.zeros((4, 6, 3), np.uint8), "rgb8", 5, "c")
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:

@@ -61,7 +61,7 @@ def test_what_is_spread_over_four_pixels_is_all_there_and_about_its_place() -> N
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("objreg_ros.native.checked") is None, reason="build with OBJREG_CHECKED=1")
-def test_no_frame_that_passes_the_checks_of_a_word_has_a_kernel_look_beside_an_array(
+def test_no_frame_that_passes_the_checks_of_its_type_has_a_kernel_look_beside_an_array(
     repository: Path,
 ) -> None:
     checked = {"OBJREG_CHECKED": "1", "PYTHONPATH": str(repository)}

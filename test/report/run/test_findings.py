@@ -64,7 +64,7 @@ def test_refusals_are_counted_without_what_was_never_tried() -> None:
     assert finding.what == "all 7 candidates were refused: 5 gravity_not_kept, 2 low_overlap"
 
 
-def test_the_live_graph_is_told_by_its_books_and_its_frames() -> None:
+def test_the_live_graph_is_closed_by_its_books_and_its_frames() -> None:
     counters = {"published": 0, "received": 100, "dropped": {"overtaken": 50}}
     row = {"stamp_ns": 1, "labels": ["cup"], "objects": []}
     told = {"nodes": {"segmenter": {**counters, "published": 3}}, "glimpses": [row], "constraints": []}
