@@ -48,8 +48,8 @@ def written(folder: Path, text: str = WRITTEN) -> str:
 
 
 def pinhole(camera: Any) -> tuple[float, ...]:
-    told = camera_from_msg.intrinsics(camera)
-    return told.fx, told.fy, told.cx, told.cy, told.width, told.height
+    intrinsics = camera_from_msg.intrinsics(camera)
+    return intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy, intrinsics.width, intrinsics.height
 
 
 def depth(width: int, height: int) -> Any:
@@ -62,17 +62,17 @@ def test_four_numbers_are_a_pinhole_camera_of_any_picture_and_six_one_of_a_size(
 
 
 def test_a_file_of_camera_calibration_gives_every_field(tmp_path: Path) -> None:
-    told = read_calibration(written(tmp_path))
-    assert (told.k, told.p, told.r, told.d[:3]) == (K, P, UPRIGHT, (0.1, -0.2, 0.001))
-    assert (told.width, told.height, told.distortion_model) == (640, 480, "plumb_bob")
-    assert pinhole(told) == (500, 501, 320, 240, 640, 480)  # P, by which rectified pictures are made
-    lens = lenses.lens_of(told)
-    assert lens is not None and lens.raw.fx == 525.5 and "rectified" in lenses.describe(told)
+    camera = read_calibration(written(tmp_path))
+    assert (camera.k, camera.p, camera.r, camera.d[:3]) == (K, P, UPRIGHT, (0.1, -0.2, 0.001))
+    assert (camera.width, camera.height, camera.distortion_model) == (640, 480, "plumb_bob")
+    assert pinhole(camera) == (500, 501, 320, 240, 640, 480)  # P, by which rectified pictures are made
+    lens = lenses.lens_of(camera)
+    assert lens is not None and lens.raw.fx == 525.5 and "rectified" in lenses.describe(camera)
 
 
-def test_a_file_may_say_no_more_than_the_matrix(tmp_path: Path) -> None:
-    told = read_calibration(written(tmp_path, "camera_matrix: [5, 0, 2, 0, 5, 1, 0, 0, 1]\nrectification_matrix:\n"))
-    assert pinhole(fitted(told, depth(4, 3))) == (5, 5, 2, 1, 4, 3) and not lenses.is_distorted(told)
+def test_a_file_may_give_the_matrix_alone(tmp_path: Path) -> None:
+    camera = read_calibration(written(tmp_path, "camera_matrix: [5, 0, 2, 0, 5, 1, 0, 0, 1]\nrectification_matrix:\n"))
+    assert pinhole(fitted(camera, depth(4, 3))) == (5, 5, 2, 1, 4, 3) and not lenses.is_distorted(camera)
 
 
 def test_a_camera_of_another_size_of_the_same_shape_is_scaled_about_the_corner_of_the_picture(tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_a_picture_of_another_shape_is_refused_with_both_sizes(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("told", "why"),
+    ("numbers", "why"),
     [
         ("525,525,320", "expected fx,fy,cx,cy or .*, got 3 numbers"),
         ("0,525,320,240", "expected focal lengths above 0, got 0 and 525"),
@@ -101,9 +101,9 @@ def test_a_picture_of_another_shape_is_refused_with_both_sizes(tmp_path: Path) -
         ("525,525,320,240,inf,480", "expected whole pixels"),
     ],
 )
-def test_numbers_that_are_no_camera_are_refused(told: str, why: str) -> None:
+def test_numbers_that_are_no_camera_are_refused(numbers: str, why: str) -> None:
     with pytest.raises(ValueError, match=f"camera: {why}"):
-        read_calibration(told)
+        read_calibration(numbers)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_messages_of_ros_stay_as_they_are() -> None:
     assert fitted(info, depth(64, 48)) is info and fitted(None, depth(64, 48)) is None
 
 
-def test_a_cloud_that_is_not_organised_needs_the_size_and_one_that_is_tells_it() -> None:
+def test_a_cloud_that_is_not_organised_needs_the_size_and_one_that_is_states_it() -> None:
     camera, dtype = of_numbers((50.0, 50.0, 3.0, 2.0)), np.dtype([("x", "f4"), ("y", "f4"), ("z", "f4")])
     assert pinhole(fitted(camera, messages.cloud(np.zeros((4, 6), dtype))))[4:] == (6, 4)
     flat = messages.cloud(np.zeros((1, 24), dtype))

@@ -28,7 +28,7 @@ def test_frames_that_nothing_ties_are_not_guessed() -> None:
     assert frames.between("camera", "imu") is None and frames.between("nowhere", "camera") is None
 
 
-def test_the_last_word_on_a_frame_counts_and_a_ring_is_no_end() -> None:
+def test_the_last_transform_of_a_frame_counts_and_a_ring_is_no_end() -> None:
     ring = FrameTree()
     ring.add_transforms(said(transform("a", "b", moved(1)), transform("b", "a", moved(2))))
     assert ring.between("c", "a") is None and ring.between("a", "b") is not None

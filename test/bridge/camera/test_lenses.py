@@ -48,14 +48,14 @@ def boxes() -> Detections:
 def test_without_distortion_every_bit_stays(D: object, model: str) -> None:
     depth, colour, millimetres, rgb = pictures()
     info, found = camera(D, model, P), boxes()
-    word = lenses.depth_image(depth, info, colour)
-    assert np.array_equal(word.depth, millimetres * np.float32(0.001)) and np.array_equal(word.rgb, rgb)
-    assert word.intrinsics.fx == 450.0 and word.shown is None
+    image = lenses.depth_image(depth, info, colour)
+    assert np.array_equal(image.depth, millimetres * np.float32(0.001)) and np.array_equal(image.rgb, rgb)
+    assert image.intrinsics.fx == 450.0 and image.shown is None
     assert lenses.detections(found, info) is found
     assert lenses.describe(info) == "none stated: taken as rectified"
 
 
-def test_a_camera_info_without_any_word_of_a_lens_tells_of_none() -> None:
+def test_a_camera_info_without_a_distortion_has_no_lens() -> None:
     info = messages.camera_info(K, 640, 480)
     del info.d
     assert not lenses.is_distorted(info) and lenses.lens_of(info) is None
@@ -66,10 +66,12 @@ def test_depth_colour_and_boxes_are_rectified_together_into_the_camera_of_P() ->
     info = camera(P=P)
     of = lenses.lens_of(info)
     assert of is not None and (of.raw.fx, of.camera.fx, of.camera.cx) == (500.0, 450.0, 310.0)
-    word = lenses.depth_image(depth, info, colour)
+    image = lenses.depth_image(depth, info, colour)
     raw = from_msg.depth_image(depth, info, colour)
-    assert np.array_equal(word.depth, of.rectify_depth(raw.depth)) and np.array_equal(word.rgb, of.rectify_colour(rgb))
-    assert (word.intrinsics.fx, word.intrinsics.fy, word.intrinsics.cx) == (450.0, 460.0, 310.0)
+    assert np.array_equal(image.depth, of.rectify_depth(raw.depth)) and np.array_equal(
+        image.rgb, of.rectify_colour(rgb)
+    )
+    assert (image.intrinsics.fx, image.intrinsics.fy, image.intrinsics.cx) == (450.0, 460.0, 310.0)
     assert np.array_equal(lenses.detections(boxes(), info).xyxy, of.rectify_xyxy(boxes().xyxy).astype(np.float32))
 
 
@@ -146,7 +148,7 @@ def test_distortion_without_a_camera_matrix_is_refused() -> None:
         (None, None, Raw(True, True)),
     ],
 )
-def test_the_names_of_topics_tell_which_pictures_are_raw(depth: str | None, image: str | None, raw: Raw) -> None:
+def test_the_names_of_topics_state_which_pictures_are_raw(depth: str | None, image: str | None, raw: Raw) -> None:
     assert raw_pictures("auto", depth, image) == raw
     assert raw_pictures("all", depth, image) == Raw(False, False)
     assert raw_pictures("none", depth, image) == Raw(True, True)

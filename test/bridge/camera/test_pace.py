@@ -11,8 +11,8 @@ from objreg_ros.bridge.camera.pace import TURN, RateLimit
 MS = 1_000_000
 
 
-def admitted(pace: RateLimit, stamps_ms: np.ndarray) -> list[int]:
-    return [k for k, stamp in enumerate(stamps_ms) if pace.admits(round(stamp * MS))]
+def admitted(limit: RateLimit, stamps_ms: np.ndarray) -> list[int]:
+    return [k for k, stamp in enumerate(stamps_ms) if limit.admits(round(stamp * MS))]
 
 
 @pytest.mark.parametrize("jitter_ms", [0.0, 2.0, 4.0])
@@ -46,9 +46,9 @@ def test_a_rate_of_nothing_gives_all() -> None:
 
 
 def test_the_first_picture_after_a_jump_goes_on_whatever_was_left_out_before() -> None:
-    pace = RateLimit(10.0)
-    admitted(pace, 90_000 + np.arange(3 * TURN - 1) * 1000 / 30)
-    assert pace.admits(1000 * MS)
+    limit = RateLimit(10.0)
+    admitted(limit, 90_000 + np.arange(3 * TURN - 1) * 1000 / 30)
+    assert limit.admits(1000 * MS)
 
 
 def test_a_clock_that_jumps_back_begins_anew() -> None:

@@ -36,7 +36,7 @@ def eye_on_base() -> Any:
 ODOMETRY = [Odometry(T_odom_body=np.eye(4), child_frame_id="base", stamp_ns=1, frame_id="odom")]
 
 
-def test_where_the_type_is_installed_tf_static_is_heard_and_says_where_the_camera_sits(
+def test_where_the_type_is_installed_tf_static_is_received_and_says_where_the_camera_sits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(transforms, "TFMessage", object)
@@ -47,11 +47,11 @@ def test_where_the_type_is_installed_tf_static_is_heard_and_says_where_the_camer
     assert T is not None and T[:3, 3].tolist() == [0.1, 0.0, 0.4] and "at 0.100 0.000 0.400 m" in node.said[0]
 
 
-def test_where_the_type_is_missing_or_a_parameter_tells_nothing_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_the_type_is_missing_or_a_parameter_is_set_nothing_is_received(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transforms, "TFMessage", object)
     node: Any = Listener()
-    told = np.eye(4)
-    assert receive_mount(node, told).T_body_camera(ODOMETRY, "eye") is told
+    mount = np.eye(4)
+    assert receive_mount(node, mount).T_body_camera(ODOMETRY, "eye") is mount
     monkeypatch.setattr(transforms, "TFMessage", None)
     assert receive_frames(node).between("base", "eye") is None
     assert node.received == {} and node.said == []

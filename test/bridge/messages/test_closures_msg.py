@@ -79,8 +79,8 @@ def test_a_closure_comes_back_with_all_that_is_known_of_it() -> None:
 
 @pytest.mark.usefixtures("there")
 def test_sessions_that_are_not_known_stay_so() -> None:
-    word = replace(CLOSURE, from_session=None, to_session=None)
-    assert_same(word, closures_msg.read_loop_closure(closures_msg.loop_closure(word)))
+    closure = replace(CLOSURE, from_session=None, to_session=None)
+    assert_same(closure, closures_msg.read_loop_closure(closures_msg.loop_closure(closure)))
 
 
 @pytest.mark.usefixtures("there")
@@ -93,23 +93,23 @@ def test_a_retraction_is_no_closure() -> None:
 
 @pytest.mark.usefixtures("there")
 def test_a_refusal_comes_back_with_its_pose_and_without_one() -> None:
-    for word in (REJECTED, replace(REJECTED, T_from_to=None, evidence={}, from_frame_id="", from_session=None)):
-        message = closures_msg.refusal(word, "robot1")
-        assert message.has_pose is (word.T_from_to is not None)
-        assert_same(replace(word, **OF_ONE), closures_msg.read_refusal(message))
+    for rejected in (REJECTED, replace(REJECTED, T_from_to=None, evidence={}, from_frame_id="", from_session=None)):
+        message = closures_msg.refusal(rejected, "robot1")
+        assert message.has_pose is (rejected.T_from_to is not None)
+        assert_same(replace(rejected, **OF_ONE), closures_msg.read_refusal(message))
 
 
 @pytest.mark.usefixtures("there")
 def test_landmarks_come_back_and_those_of_a_label_without_a_number_too() -> None:
     xyz = np.array([0.1, 0.2, 1.5])
-    words = tuple(Observation(label=label, object_id=k, xyz=xyz * k) for k, label in enumerate(("tv", "thing", "dog")))
-    message = closures_msg.object_landmarks(words, STAMP, "kinect", NAMES, 2, "robot1")
-    told = closures_msg.ObjectLandmark
-    assert [item.class_id for item in message.landmarks] == [7, told.NO_NAME, told.NO_CLASS]
+    sent = tuple(Observation(label=label, object_id=k, xyz=xyz * k) for k, label in enumerate(("tv", "thing", "dog")))
+    message = closures_msg.object_landmarks(sent, STAMP, "kinect", NAMES, 2, "robot1")
+    numbers = closures_msg.ObjectLandmark
+    assert [item.class_id for item in message.landmarks] == [7, numbers.NO_NAME, numbers.NO_CLASS]
     assert (message.robot, message.session, message.header.frame_id) == ("robot1", "2", "kinect")
     assert not np.any(message.landmarks[0].position_covariance)
-    for word, back in zip(words, closures_msg.read_landmarks(message), strict=True):
-        assert (back.label, back.object_id) == (word.label, word.object_id) and np.array_equal(back.xyz, word.xyz)
+    for one, back in zip(sent, closures_msg.read_landmarks(message), strict=True):
+        assert (back.label, back.object_id) == (one.label, one.object_id) and np.array_equal(back.xyz, one.xyz)
 
 
 @pytest.mark.usefixtures("there")
@@ -149,7 +149,7 @@ def test_the_id_of_a_closure_is_that_of_its_moments_and_of_its_robot() -> None:
     assert closures_msg.closure_id(again, "robot1") == first
     others = [replace(CLOSURE, **{name: 77}) for name in ("from_ns", "to_ns", "from_session", "to_session")]
     others += [replace(CLOSURE, from_frame_id="rear"), replace(CLOSURE, to_frame_id="rear")]
-    ids = {closures_msg.closure_id(word, "robot1") for word in others} | {closures_msg.closure_id(CLOSURE, "robot2")}
+    ids = {closures_msg.closure_id(other, "robot1") for other in others} | {closures_msg.closure_id(CLOSURE, "robot2")}
     assert len(ids) == 7 and first not in ids
 
 
@@ -176,14 +176,14 @@ def test_the_message_has_the_numbers_that_are_no_class(repository: Path) -> None
 
 
 @pytest.mark.usefixtures("there")
-def test_what_is_of_two_robots_stays_so_whoever_tells_it() -> None:
+def test_what_is_of_two_robots_stays_so_whoever_sends_it() -> None:
     between = replace(CLOSURE, **OF_TWO)
     assert_same(between, closures_msg.read_loop_closure(closures_msg.loop_closure(between, "robot3")))
     refused = replace(REJECTED, **OF_TWO)
     assert_same(refused, closures_msg.read_refusal(closures_msg.refusal(refused, "robot3")))
 
 
-def test_an_id_is_of_the_robots_that_the_closure_tells_and_else_of_who_tells_it() -> None:
+def test_an_id_is_of_the_robots_that_the_closure_names_and_else_of_who_sends_it() -> None:
     first = closures_msg.closure_id(CLOSURE, "robot1")
     assert closures_msg.closure_id(replace(CLOSURE, **OF_ONE), "robot3") == first
     assert closures_msg.closure_id(replace(CLOSURE, **OF_TWO), "robot1") != first

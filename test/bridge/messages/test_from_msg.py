@@ -35,8 +35,8 @@ def test_the_stamp_of_a_header_a_message_and_a_time_is_the_same() -> None:
 
 def test_depth_comes_with_the_size_of_its_camera() -> None:
     raw = messages.image(np.full((48, 64), 1500, np.uint16), "16UC1")
-    word = from_msg.depth_image(raw, messages.camera_info(K, 64, 48))
-    assert word.depth.shape == (48, 64) and word.depth[0, 0] == pytest.approx(1.5)
+    image = from_msg.depth_image(raw, messages.camera_info(K, 64, 48))
+    assert image.depth.shape == (48, 64) and image.depth[0, 0] == pytest.approx(1.5)
     with pytest.raises(ValueError, match=r"expected camera_info's size 32 × 24, got 64 × 48"):
         from_msg.depth_image(raw, messages.camera_info(K, 32, 24))
 
@@ -98,8 +98,8 @@ def test_a_projection_matrix_that_cannot_be_is_refused_though_K_could(f: float, 
 
 
 def test_the_view_is_of_the_camera_of_its_projection_matrix() -> None:
-    word = from_msg.view(messages.cloud(packed_cloud()), messages.camera_info(K, 4, 3, P))
-    assert (word.intrinsics.fx, word.intrinsics.cx) == (400.0, 30.5)
+    view = from_msg.view(messages.cloud(packed_cloud()), messages.camera_info(K, 4, 3, P))
+    assert (view.intrinsics.fx, view.intrinsics.cx) == (400.0, 30.5)
 
 
 def test_an_organised_cloud_needs_no_camera_and_so_no_calibration() -> None:
@@ -207,9 +207,9 @@ def test_a_datatype_that_does_not_exist_is_refused() -> None:
 
 def test_odometry_is_a_pose() -> None:
     half = np.sqrt(0.5)
-    word = motion_from_msg.odometry(messages.odometry((0, 0, half, half), (1, 2, 3)))
-    assert np.allclose(word.T_odom_body[:3, :3], rotation_from_vector(np.array([0, 0, np.pi / 2])))
-    assert word.T_odom_body[:3, 3].tolist() == [1, 2, 3] and word.child_frame_id == "base_link"
+    odometry = motion_from_msg.odometry(messages.odometry((0, 0, half, half), (1, 2, 3)))
+    assert np.allclose(odometry.T_odom_body[:3, :3], rotation_from_vector(np.array([0, 0, np.pi / 2])))
+    assert odometry.T_odom_body[:3, 3].tolist() == [1, 2, 3] and odometry.child_frame_id == "base_link"
 
 
 def test_gravity_is_down_in_the_frame_of_a_level_odometry() -> None:
@@ -238,26 +238,26 @@ def imu(**changes: object) -> SimpleNamespace:
     return SimpleNamespace(header=header, **{**fields, **changes})
 
 
-def test_an_imu_tells_what_its_covariances_say_that_it_measures() -> None:
-    word = motion_from_msg.imu(imu())
-    assert word.acceleration is not None and word.acceleration.tolist() == [0.0, -9.8, 0.1]
-    assert word.angular_velocity is not None and word.angular_velocity.tolist() == [0.1, 0.2, 0.3]
-    assert (word.orientation, word.stamp_ns, word.frame_id) == (None, 1_000_000_005, "imu")
+def test_an_imu_gives_what_its_covariances_say_that_it_measures() -> None:
+    sample = motion_from_msg.imu(imu())
+    assert sample.acceleration is not None and sample.acceleration.tolist() == [0.0, -9.8, 0.1]
+    assert sample.angular_velocity is not None and sample.angular_velocity.tolist() == [0.1, 0.2, 0.3]
+    assert (sample.orientation, sample.stamp_ns, sample.frame_id) == (None, 1_000_000_005, "imu")
     unknown = np.array([-1.0, *np.zeros(8)])
-    word = motion_from_msg.imu(imu(linear_acceleration_covariance=unknown, angular_velocity_covariance=unknown))
-    assert word.acceleration is None and word.angular_velocity is None
+    sample = motion_from_msg.imu(imu(linear_acceleration_covariance=unknown, angular_velocity_covariance=unknown))
+    assert sample.acceleration is None and sample.angular_velocity is None
 
 
 def test_an_orientation_is_a_unit_quaternion_that_somebody_set() -> None:
-    told = {"orientation_covariance": np.diag([4e-4, 1e-4, 9.0]).ravel()}
-    word = motion_from_msg.imu(imu(**told))
-    assert word.orientation is not None and word.orientation_sigma_deg == pytest.approx(np.degrees(0.02))
+    known = {"orientation_covariance": np.diag([4e-4, 1e-4, 9.0]).ravel()}
+    sample = motion_from_msg.imu(imu(**known))
+    assert sample.orientation is not None and sample.orientation_sigma_deg == pytest.approx(np.degrees(0.02))
     empty = np.zeros(9)
     assert motion_from_msg.imu(imu(orientation_covariance=empty)).orientation is None
     turned = SimpleNamespace(x=0.6, y=0.0, z=0.0, w=0.8)
     assert motion_from_msg.imu(imu(orientation_covariance=empty, orientation=turned)).orientation is not None
     nothing = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
-    assert motion_from_msg.imu(imu(**told, orientation=nothing)).orientation is None
+    assert motion_from_msg.imu(imu(**known, orientation=nothing)).orientation is None
 
 
 @pytest.mark.parametrize("field", ["linear_acceleration", "angular_velocity", "orientation"])
@@ -267,17 +267,17 @@ def test_an_imu_that_measures_no_number_is_refused(field: str) -> None:
         motion_from_msg.imu(imu(**{field: broken, "orientation_covariance": np.full(9, 1e-4)}))
 
 
-def test_gravity_between_two_words_is_between_theirs_and_as_sure_as_the_less_sure() -> None:
-    def word(stamp_ns: int, degrees: float, sigma_deg: float, frame_id: str = "imu") -> FeltGravity:
+def test_gravity_between_two_samples_is_between_theirs_and_as_sure_as_the_less_sure() -> None:
+    def felt(stamp_ns: int, degrees: float, sigma_deg: float, frame_id: str = "imu") -> FeltGravity:
         gravity = np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees)), 0.0])
         return FeltGravity(gravity=gravity, gravity_sigma_deg=sigma_deg, stamp_ns=stamp_ns, frame_id=frame_id)
 
-    between = motion_from_msg.gravity_at(15, (word(10, 0.0, 1.0), word(20, 4.0, 2.0)))
-    assert between.gravity == pytest.approx(word(15, 2.0, 2.0).gravity)
+    between = motion_from_msg.gravity_at(15, (felt(10, 0.0, 1.0), felt(20, 4.0, 2.0)))
+    assert between.gravity == pytest.approx(felt(15, 2.0, 2.0).gravity)
     assert (between.gravity_sigma_deg, between.stamp_ns) == (2.0, 15)
-    alone = word(10, 0.0, 1.0)
+    alone = felt(10, 0.0, 1.0)
     assert motion_from_msg.gravity_at(15, (alone,)) is alone
-    other = word(20, 4.0, 2.0, "another")
+    other = felt(20, 4.0, 2.0, "another")
     assert motion_from_msg.gravity_at(18, (alone, other)) is other
 
 
@@ -295,7 +295,7 @@ def test_a_pose_without_a_rotation_is_refused() -> None:
         motion_from_msg.odometry(messages.odometry((0, 0, 0, 0)))
 
 
-def test_a_constraint_tells_its_two_moments() -> None:
+def test_a_constraint_names_its_two_moments() -> None:
     message = messages.odometry(at=(0.1, 0, 0), frame_id="camera@12.000000034")
     message.child_frame_id = "rear@99.500000000"
     closure = from_msg.loop_closure(message)
@@ -545,10 +545,10 @@ def test_the_camera_sits_where_the_body_carries_it() -> None:
     T_body_camera[1, 3] = 2
     parts = (messages.own_table(object_rows()), view, info, gravity_message(0, 0, 0), {})
     half = np.sqrt(0.5)
-    word = motion_from_msg.odometry(
+    odometry = motion_from_msg.odometry(
         messages.odometry((0, 0, half, half), (1, 0, 0))
     )  # the body's y is back along odom's x
-    frame = from_msg.frame(*parts, [word], T_body_camera)
+    frame = from_msg.frame(*parts, [odometry], T_body_camera)
     assert frame.T_odom_camera is not None and np.allclose(frame.T_odom_camera[:3, 3], (-1, 0, 0))
     assert frame.gravity is None and frame.gravity_confidence == 0
 

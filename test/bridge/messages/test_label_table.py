@@ -17,13 +17,13 @@ def test_a_name_that_is_met_gets_a_number_once() -> None:
     assert sorted(table.names.values()) == ["cup", "tv"] and sorted(table.names) == [0, 1]
 
 
-def test_names_that_were_told_keep_their_numbers_and_others_come_behind_them() -> None:
+def test_names_that_were_announced_keep_their_numbers_and_others_come_behind_them() -> None:
     table = LabelTable()
     table.adopt_table({3: "cup"})
     assert table.include(["cup", "tv"]) and table.names == {3: "cup", 4: "tv"}
 
 
-def test_what_was_met_stays_when_another_table_is_told() -> None:
+def test_what_was_met_stays_when_another_table_is_announced() -> None:
     table = LabelTable()
     table.include(["tv"])
     table.adopt_table({0: "cup", 1: "dog"})

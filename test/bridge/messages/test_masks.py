@@ -60,7 +60,7 @@ def test_rows_in_another_order_bring_their_masks_along() -> None:
     np.testing.assert_array_equal(read(rows[:, ::-1]).instances, some_masks())
 
 
-def test_masks_of_half_the_size_are_told_in_that_of_the_picture() -> None:
+def test_masks_of_half_the_size_are_given_in_that_of_the_picture() -> None:
     half = np.zeros((30, 40), np.uint16)
     half[6:20, 12:28] = 2
     instances = read(with_masks(table(found(None)), found(half))).instances

@@ -295,7 +295,7 @@ def test_a_raw_picture_has_the_same_limit() -> None:
         depth_metres(message, 23)
 
 
-def test_a_row_of_more_pixels_than_a_table_can_tell_is_refused() -> None:
+def test_a_row_of_more_pixels_than_a_table_can_state_is_refused() -> None:
     with pytest.raises(ValueError, match="expected at most 65535 pixels a side, got 70000 × 2"):
         colour_pixels(messages.compressed(png_that_claims(70_000, 2, 8, 2), "png"))
 
@@ -404,7 +404,7 @@ def test_packed_colours_come_apart() -> None:
 
 
 @pytest.mark.parametrize("kind", [".jpg", ".png"])
-def test_the_size_is_told_before_any_pixel_is_decoded(kind: str) -> None:
+def test_the_size_is_known_before_any_pixel_is_decoded(kind: str) -> None:
     data = cv2.imencode(kind, np.zeros((4, 6, 3), np.uint8))[1].tobytes()
     assert size_of(messages.image(flat(1, 2, 3), "rgb8")) == size_of(messages.compressed(data, "jpeg")) == (6, 4)
     depth = bytes(12) + cv2.imencode(".png", np.zeros((4, 6), np.uint16))[1].tobytes()

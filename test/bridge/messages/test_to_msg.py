@@ -90,9 +90,9 @@ def test_messages_are_filled_with_bytes_and_not_element_by_element() -> None:
 def test_depth_comes_back_exactly_in_metres_and_to_half_a_millimetre_in_16_bits() -> None:
     depth = RNG.uniform(0.3, 4.0, (6, 8)).astype(np.float32)
     depth[0, 0], depth[0, 1] = 0, 100.0  # 100 m does not fit 16 bits of millimetres
-    word = DepthImage(depth=depth, rgb=None, intrinsics=CAMERA, stamp_ns=STAMP)
-    assert np.array_equal(from_msg.depth(to_msg.depth_image(word)), depth)
-    millimetres = from_msg.depth(to_msg.depth_image(word, millimetres=True))
+    image = DepthImage(depth=depth, rgb=None, intrinsics=CAMERA, stamp_ns=STAMP)
+    assert np.array_equal(from_msg.depth(to_msg.depth_image(image)), depth)
+    millimetres = from_msg.depth(to_msg.depth_image(image, millimetres=True))
     assert millimetres[0, 0] == 0 and millimetres[0, 1] == 0
     assert np.abs(millimetres - depth)[1:].max() <= 0.00051
 
@@ -118,7 +118,7 @@ def test_a_cloud_comes_back_with_its_holes_and_with_colour_only_if_it_had_some(c
 
 
 def test_detections_come_back_with_their_names() -> None:
-    word = Detections(
+    detections = Detections(
         xyxy=np.array([[1, 2, 30.5, 40], [5, 6, 7, 8]], np.float32),
         score=np.array([0.9, 0.4], np.float32),
         label=("tv", "cup"),
@@ -126,17 +126,19 @@ def test_detections_come_back_with_their_names() -> None:
         stamp_ns=STAMP,
         frame_id="kinect",
     )
-    message = to_msg.detections_table(word, NAMES)
+    message = to_msg.detections_table(detections, NAMES)
     assert table(message)["class_id"].tolist() == [[7, 0]]  # the first of two ids of one name
     back = from_msg.detections(message, NAMES)
-    assert np.array_equal(back.xyxy, word.xyxy) and np.array_equal(back.score, word.score)
+    assert np.array_equal(back.xyxy, detections.xyxy) and np.array_equal(back.score, detections.score)
     assert (back.label, back.image_hw, back.stamp_ns) == (("tv", "cup"), (480, 640), STAMP)
 
 
 def test_no_detection_gives_an_empty_table_with_the_header_of_the_image() -> None:
     empty = np.zeros((0, 4), np.float32)
-    word = Detections(xyxy=empty, score=empty[:, 0], label=(), image_hw=(480, 640), stamp_ns=STAMP, frame_id="kinect")
-    message = to_msg.detections_table(word, NAMES)
+    detections = Detections(
+        xyxy=empty, score=empty[:, 0], label=(), image_hw=(480, 640), stamp_ns=STAMP, frame_id="kinect"
+    )
+    message = to_msg.detections_table(detections, NAMES)
     assert message.width == 0 and message.header.frame_id == "kinect"
     assert len(from_msg.detections(message, NAMES)) == 0
 
@@ -180,12 +182,12 @@ def test_objects_and_their_support_come_back_as_they_were(coloured: bool) -> Non
     )
     objects, support = from_msg.objects(to_msg.objects(sent, NAMES), NAMES)
     assert support is not None and [o.label for o in objects] == ["cup", "tv"]
-    for back, word in zip((support, *objects), (sent.support, *sent.objects), strict=True):
-        assert word is not None
+    for back, cloud in zip((support, *objects), (sent.support, *sent.objects), strict=True):
+        assert cloud is not None
         for name in ("xyz", "normals", "flags"):
-            assert np.array_equal(getattr(back, name), getattr(word, name)), name
-        assert np.array_equal(back.rgb, word.rgb) if coloured else back.rgb is None
-        assert (back.score, back.density, back.instance) == (word.score, word.density, word.instance)
+            assert np.array_equal(getattr(back, name), getattr(cloud, name)), name
+        assert np.array_equal(back.rgb, cloud.rgb) if coloured else back.rgb is None
+        assert (back.score, back.density, back.instance) == (cloud.score, cloud.density, cloud.instance)
 
 
 def test_a_frame_without_objects_is_a_message_without_points() -> None:
@@ -246,7 +248,7 @@ def test_each_object_of_a_closure_is_one_transform_that_names_it() -> None:
     assert {(headers.stamp_ns(m), m.header.frame_id) for m in messages} == {(STAMP, "front@0.000000005")}
 
 
-def test_landmarks_tell_where_each_object_of_a_keyframe_was_and_which_it_is() -> None:
+def test_landmarks_state_where_each_object_of_a_keyframe_was_and_which_it_is() -> None:
     seen = [
         Observation(label=label, object_id=k, xyz=np.array([k, 0.5, 2.0])) for k, label in ((7, "cup"), (9, "book"))
     ]
@@ -269,8 +271,8 @@ def test_a_path_keeps_the_time_and_the_place_of_each_pose() -> None:
 
 def test_odometry_comes_back_as_it_was() -> None:
     T = pose(rotation_from_vector(np.array([3.0, 0.5, 0.2])), np.array([3.0, 2.0, 1.0]))
-    word = Odometry(T_odom_body=T, stamp_ns=STAMP, frame_id="world", child_frame_id="kinect")
-    back = motion_from_msg.odometry(to_msg.odometry(word))
+    odometry = Odometry(T_odom_body=T, stamp_ns=STAMP, frame_id="world", child_frame_id="kinect")
+    back = motion_from_msg.odometry(to_msg.odometry(odometry))
     assert np.allclose(back.T_odom_body, T, atol=1e-12)
     assert (back.stamp_ns, back.frame_id, back.child_frame_id) == (STAMP, "world", "kinect")
 
@@ -280,15 +282,15 @@ def test_labels_come_back_with_numbers_for_keys() -> None:
     assert from_msg.labels(message) == NAMES and json.loads(message.data)["7"] == "tv"
 
 
-def test_a_receipt_tells_the_node_the_frame_and_what_became_of_it() -> None:
+def test_an_acknowledgement_names_the_node_the_frame_and_what_became_of_it() -> None:
     published, dropped = to_msg.finished("segmenter", STAMP), to_msg.finished("segmenter", STAMP, "unmatched")
     assert (published.frame_id, dropped.frame_id) == ("segmenter published", "segmenter dropped unmatched")
     assert headers.stamp_ns(published) == STAMP
 
 
-def test_the_receipt_of_a_frame_whose_keyframe_waits_says_that_it_was_followed() -> None:
-    receipt = to_msg.followed("registrar", STAMP)
-    assert (receipt.frame_id, headers.stamp_ns(receipt)) == ("registrar followed", STAMP)
+def test_the_acknowledgement_of_a_frame_whose_keyframe_waits_says_that_it_was_followed() -> None:
+    acknowledgement = to_msg.followed("registrar", STAMP)
+    assert (acknowledgement.frame_id, headers.stamp_ns(acknowledgement)) == ("registrar followed", STAMP)
 
 
 @pytest.mark.parametrize("stamp_ns", [-(2**31) * 10**9 - 1, 2**31 * 10**9])

@@ -124,8 +124,8 @@ def test_more_boxes_than_a_picture_can_have_are_refused_before_any_is_read() -> 
 
 
 def test_a_label_info_gives_names_to_numbers() -> None:
-    told = [SimpleNamespace(class_id=1, class_name="cup"), SimpleNamespace(class_id=300, class_name="tv")]
-    assert vision_from_msg.label_info(SimpleNamespace(class_map=told)) == {1: "cup", 300: "tv"}
+    classes = [SimpleNamespace(class_id=1, class_name="cup"), SimpleNamespace(class_id=300, class_name="tv")]
+    assert vision_from_msg.label_info(SimpleNamespace(class_map=classes)) == {1: "cup", 300: "tv"}
 
 
 def test_every_number_in_a_picture_of_masks_is_an_instance() -> None:

@@ -13,7 +13,7 @@ STEPS = st.lists(st.tuples(st.sampled_from(("receive", "publish", "overtaken", "
 
 
 @given(STEPS)
-def test_the_books_balance_after_every_step(steps: list[tuple[str, int]]) -> None:
+def test_the_counters_balance_after_every_step(steps: list[tuple[str, int]]) -> None:
     accounting, waiting = Accounting(), Counter[int]()
     for what, stamp_ns in steps:
         if what == "receive":

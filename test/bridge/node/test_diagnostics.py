@@ -13,7 +13,7 @@ from objreg_ros.bridge.node.diagnostics import acceptances, accepted_of, balance
 from objreg_ros.data.closures import LoopClosure, ObjectMatch, Reason, Rejected
 from objreg_ros.diagnostics import Diagnostics, reading
 
-BOOKS = Balance(
+BALANCE = Balance(
     received=10,
     published=6,
     waiting=1,
@@ -29,13 +29,13 @@ class Own(Diagnostics):
 
 
 def status(*troubles: str) -> DiagnosticStatus:
-    return diagnostic("/detector", Time(sec=4), troubles, CommonDiagnostics.of(BOOKS, 29.97), Own(keyframes=7)).status[
-        0
-    ]
+    return diagnostic(
+        "/detector", Time(sec=4), troubles, CommonDiagnostics.of(BALANCE, 29.97), Own(keyframes=7)
+    ).status[0]
 
 
-def test_the_books_survive_the_way_over_the_wire() -> None:
-    assert balance_of(status()) == BOOKS
+def test_the_counters_come_back_from_their_message() -> None:
+    assert balance_of(status()) == BALANCE
 
 
 def test_what_a_node_adds_is_shown() -> None:

@@ -27,7 +27,7 @@ def troubled(drops: Drops, clock: Clock, seconds: float) -> list[int]:
     return found
 
 
-def test_an_input_of_which_everything_is_dropped_for_a_period_is_told_with_the_reasons() -> None:
+def test_an_input_of_which_everything_is_dropped_for_a_period_is_reported_with_the_reasons() -> None:
     drops, clock = made()
     for second in range(7):
         clock.now = float(second)
@@ -35,8 +35,8 @@ def test_an_input_of_which_everything_is_dropped_for_a_period_is_told_with_the_r
         if second < 5:
             assert drops.lasting() == {}
     drops.drop("frames", "unmatched", "no partner")
-    told = drops.lasting()["frames"]
-    assert told == "frames: everything was dropped for 6 s, 7 as malformed image, 1 as unmatched (got 6)"
+    trouble = drops.lasting()["frames"]
+    assert trouble == "frames: everything was dropped for 6 s, 7 as malformed image, 1 as unmatched (got 6)"
 
 
 def test_a_burst_is_trouble_for_a_while_and_a_single_drop_is_none() -> None:
@@ -82,7 +82,7 @@ def test_what_gets_through_now_and_then_makes_no_flicker() -> None:
     assert seen[5:] == [True] * 75
 
 
-def test_of_several_inputs_each_is_closed_by_itself() -> None:
+def test_of_several_inputs_each_is_reported_by_itself() -> None:
     drops, clock = made()
     for second in range(7):
         clock.now = float(second)

@@ -77,7 +77,7 @@ def test_a_node_that_is_not_managed_opens_as_it_is_made_and_has_no_life_cycle(ma
     assert not [service for service in shop.services if "change_state" in service.srv_name]
 
 
-def test_a_managed_node_is_active_from_the_start_unless_it_is_told_to_wait(made: Callable[..., Shop]) -> None:
+def test_a_managed_node_is_active_from_the_start_unless_it_is_asked_to_wait(made: Callable[..., Shop]) -> None:
     shop = made("managed:=true")
     assert shop.state == "active" and shop.is_active and shop.notes == ["opened"]
 
@@ -94,7 +94,7 @@ def test_it_opens_when_it_is_configured_and_lets_frames_in_while_it_is_active(sh
     assert balance.dropped == {"inactive": 2} and balance.waiting == 2
 
 
-def test_what_was_opened_is_taken_down_as_often_as_it_is_cleaned_up_and_the_books_begin_anew(shop: Shop) -> None:
+def test_what_was_opened_is_taken_down_as_often_as_it_is_cleaned_up_and_the_counters_begin_anew(shop: Shop) -> None:
     before = [thing for thing, _ in shop._entities()]
     for _ in range(3):
         assert shop.trigger_configure() == DONE

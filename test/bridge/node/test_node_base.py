@@ -41,14 +41,14 @@ def refuse(message: Any) -> None:
     raise ValueError(f"expected better than {message!r}")
 
 
-WORDS = {"quiet": String, "loud": String}
+TEXTS = {"quiet": String, "loud": String}
 
 
 def decode(_: str, message: Any) -> str:
     if message.data == "bug":
         raise IndexError("nobody expected this")
     if message.data == "junk":
-        raise ValueError("expected a word, got junk")
+        raise ValueError("expected a text, got junk")
     return message.data
 
 
@@ -88,7 +88,7 @@ def test_what_no_decoder_should_raise_drops_the_message_by_the_name_of_the_excep
     assert len(bugs) == 2 and all("Traceback" in line and "def stumble" not in line for line in bugs)
 
 
-def test_a_bug_in_the_work_on_a_frame_is_counted_by_its_name_told_once_and_the_node_lives(
+def test_a_bug_in_the_work_on_a_frame_is_counted_by_its_name_reported_once_and_the_node_lives(
     node: NodeBase, said: list[str]
 ) -> None:
     for stamp_ns in (5, 6):
@@ -100,9 +100,9 @@ def test_a_bug_in_the_work_on_a_frame_is_counted_by_its_name_told_once_and_the_n
 
 @pytest.mark.parametrize(
     ("error", "counted"),
-    [(ValueError("a stamp"), "malformed word"), (SystemError("a bug"), "malformed word (SystemError)")],
+    [(ValueError("a stamp"), "malformed text"), (SystemError("a bug"), "malformed text (SystemError)")],
 )
-def test_a_message_that_breaks_where_it_is_heard_is_counted_and_the_next_one_is_heard(
+def test_a_message_that_breaks_where_it_is_received_is_counted_and_the_next_one_is_received(
     node: NodeBase, error: Exception, counted: str
 ) -> None:
     received: list[str] = []
@@ -112,11 +112,11 @@ def test_a_message_that_breaks_where_it_is_heard_is_counted_and_the_next_one_is_
             raise error
         received.append(message.data)
 
-    node.listen(String, "word", receive, qos.stage())
-    word = node.create_publisher(String, "word", qos.stage())
-    spin_until(node, [] if word.get_subscription_count() == 0 else [1], 1)
+    node.listen(String, "text", receive, qos.stage())
+    publisher = node.create_publisher(String, "text", qos.stage())
+    spin_until(node, [] if publisher.get_subscription_count() == 0 else [1], 1)
     for data in ("bad", "good"):
-        word.publish(String(data=data))
+        publisher.publish(String(data=data))
     spin_until(node, received, 1)
     assert received == ["good"] and node._ignored == {counted: 1}
 
@@ -141,60 +141,60 @@ class Clock:
 
 
 @pytest.fixture
-def told(node: NodeBase, monkeypatch: pytest.MonkeyPatch) -> Callable[[float], DiagnosticStatus]:
+def report_at(node: NodeBase, monkeypatch: pytest.MonkeyPatch) -> Callable[[float], DiagnosticStatus]:
     """The status that a node reports at a time by the clock of its drops."""
     clock = Clock()
     node._drops = Drops(period_s=5.0, clock=clock)
-    told: list[Any] = []
-    monkeypatch.setattr(node._diagnostics, "publish", told.append)
+    published: list[Any] = []
+    monkeypatch.setattr(node._diagnostics, "publish", published.append)
 
     def report(now: float) -> DiagnosticStatus:
         clock.now = now
         node._report()
-        return told[-1].status[0]
+        return published[-1].status[0]
 
     return report
 
 
 def test_thirty_of_thirty_malformed_frames_are_a_warning_with_the_reason(
-    node: NodeBase, told: Callable[[float], DiagnosticStatus]
+    node: NodeBase, report_at: Callable[[float], DiagnosticStatus]
 ) -> None:
     for stamp_ns in range(30):
-        told(stamp_ns * 0.2)
+        report_at(stamp_ns * 0.2)
         node.accept(stamp_ns)
         node.conclude(stamp_ns, lambda: bool(node.read("image", refuse, "x")))
-    warned = told(6.0)
+    warned = report_at(6.0)
     assert warned.level == DiagnosticStatus.WARN
     assert "30 as malformed image (expected better than 'x')" in warned.message
     node.accept(30)
     node.conclude(30, lambda: True)
-    assert told(17.0).level == DiagnosticStatus.OK
+    assert report_at(17.0).level == DiagnosticStatus.OK
 
 
 def test_an_input_beside_the_frames_of_which_everything_is_malformed_is_a_warning(
-    node: NodeBase, told: Callable[[float], DiagnosticStatus]
+    node: NodeBase, report_at: Callable[[float], DiagnosticStatus]
 ) -> None:
     for second in range(7):
-        told(second)
+        report_at(second)
         node.read_aside("odom", refuse, "x")
         node.read_aside("labels", refuse if second else str.upper, "x")
-    assert told(6.0).message.startswith("odom: everything was dropped for 6 s, 7 as malformed")
+    assert report_at(6.0).message.startswith("odom: everything was dropped for 6 s, 7 as malformed")
     node.read_aside("odom", str.upper, "x")
     node.read_aside("labels", str.upper, "x")
-    assert told(17.0).level == DiagnosticStatus.OK
+    assert report_at(17.0).level == DiagnosticStatus.OK
 
 
 def test_frames_that_newer_ones_overtake_are_no_trouble_where_some_get_through(
-    node: NodeBase, told: Callable[[float], DiagnosticStatus]
+    node: NodeBase, report_at: Callable[[float], DiagnosticStatus]
 ) -> None:
     for stamp_ns in range(100):
-        told(stamp_ns * 0.2)
+        report_at(stamp_ns * 0.2)
         node.accept(stamp_ns)
         if stamp_ns % 20 == 0:
             node.conclude(stamp_ns, lambda: True)
         else:
             node._overtaken((stamp_ns, None))
-        assert told(stamp_ns * 0.2).level == DiagnosticStatus.OK
+        assert report_at(stamp_ns * 0.2).level == DiagnosticStatus.OK
 
 
 def test_a_message_aside_that_breaks_its_contract_is_nothing(node: NodeBase) -> None:
@@ -204,7 +204,7 @@ def test_a_message_aside_that_breaks_its_contract_is_nothing(node: NodeBase) -> 
 
 def test_of_topics_that_carry_the_same_the_first_that_speaks_is_kept_and_the_others_are_closed(node: NodeBase) -> None:
     received: list[tuple[str, str]] = []
-    node.listen_to_first("words", WORDS, decode, lambda topic, m: received.append((topic, m.data)), qos.stage())
+    node.listen_to_first("texts", TEXTS, decode, lambda topic, m: received.append((topic, m.data)), qos.stage())
     loud, quiet = (node.create_publisher(String, topic, qos.stage()) for topic in ("loud", "quiet"))
     spin_until(node, [] if loud.get_subscription_count() == 0 else [1], 1)
     loud.publish(String(data="one"))
@@ -214,63 +214,63 @@ def test_of_topics_that_carry_the_same_the_first_that_speaks_is_kept_and_the_oth
     quiet.publish(String(data="two"))
     loud.publish(String(data="three"))
     spin_until(node, received, 2)
-    assert received[1:] == [("loud", "three")] and node.taken("words") == "loud"
+    assert received[1:] == [("loud", "three")] and node.taken("texts") == "loud"
 
 
 def test_a_message_that_does_not_decode_closes_no_topic(node: NodeBase) -> None:
     received: list[str] = []
-    node.listen_to_first("words", WORDS, decode, lambda topic, m: received.append(m.data), qos.stage())
+    node.listen_to_first("texts", TEXTS, decode, lambda topic, m: received.append(m.data), qos.stage())
     loud, quiet = (node.create_publisher(String, topic, qos.stage()) for topic in ("loud", "quiet"))
     spin_until(node, [] if quiet.get_subscription_count() == 0 else [1], 1)
-    for publisher, word in ((loud, "junk"), (loud, "bug"), (quiet, "one")):
-        publisher.publish(String(data=word))
+    for publisher, data in ((loud, "junk"), (loud, "bug"), (quiet, "one")):
+        publisher.publish(String(data=data))
         spin_until(node, received, len(received) + 1)
-    assert received == ["junk", "bug", "one"] and node.taken("words") == "quiet"
+    assert received == ["junk", "bug", "one"] and node.taken("texts") == "quiet"
     assert node.count_subscribers("/loud") == 0
 
 
 def test_the_other_topics_are_opened_again_once_the_one_that_was_taken_is_silent(node: NodeBase) -> None:
-    node.listen_to_first("words", WORDS, decode, lambda *_: None, qos.stage())
-    choice = node._choices["words"]
+    node.listen_to_first("texts", TEXTS, decode, lambda *_: None, qos.stage())
+    choice = node._choices["texts"]
     choice.choose_topic("loud", String(data="one"))
     assert node.count_subscribers("/quiet") == 0
     choice._clock = lambda: time.monotonic() + 5.0
     node._report()
-    assert node.taken("words") is None
+    assert node.taken("texts") is None
     assert node.count_subscribers("/quiet") == node.count_subscribers("/loud") == 1
 
 
-def test_an_input_that_is_hung_up_has_no_subscriptions_and_hears_nothing_more(node: NodeBase) -> None:
-    node.listen_to_first("words", WORDS, decode, lambda *_: None, qos.stage())
+def test_an_input_that_is_hung_up_has_no_subscriptions_and_receives_nothing_more(node: NodeBase) -> None:
+    node.listen_to_first("texts", TEXTS, decode, lambda *_: None, qos.stage())
     assert node.count_subscribers("/quiet") == node.count_subscribers("/loud") == 1
-    node.hang_up("words")
+    node.hang_up("texts")
     node.hang_up("never opened")
     assert node.count_subscribers("/quiet") == node.count_subscribers("/loud") == 0
 
 
-@pytest.mark.parametrize(("publishers", "lost"), [(1, {"word": 3}), (2, {})])
+@pytest.mark.parametrize(("publishers", "lost"), [(1, {"text": 3}), (2, {})])
 def test_what_the_transport_lost_is_counted_where_one_publisher_numbered_it(
     node: NodeBase, publishers: int, lost: dict[str, int]
 ) -> None:
-    node.count_publishers = {"/word": publishers}.__getitem__  # type: ignore[method-assign]
+    node.count_publishers = {"/text": publishers}.__getitem__  # type: ignore[method-assign]
     for count in (3, 0):
-        node._note_loss("word", count)
+        node._note_loss("text", count)
     assert node.accounting.balance().lost == lost
 
 
 def test_the_rate_is_of_what_came_since_the_last_report(node: NodeBase) -> None:
-    told: list[Any] = []
-    node._diagnostics.publish = told.append  # type: ignore[method-assign]
+    published: list[Any] = []
+    node._diagnostics.publish = published.append  # type: ignore[method-assign]
     for since, frames in ((4.0, range(8)), (2.0, range(8, 11))):
         node._last = (time.monotonic() - since, node._last[1])
         for stamp_ns in frames:
             node.accept(stamp_ns)
         node._report()
-    rates = [float(value.value) for array in told for value in array.status[0].values if value.key == "rate [Hz]"]
+    rates = [float(value.value) for array in published for value in array.status[0].values if value.key == "rate [Hz]"]
     assert rates == pytest.approx([2.0, 1.5], rel=0.1)
 
 
-def test_while_a_service_waits_for_work_aside_the_node_hears_on(node: NodeBase) -> None:
+def test_while_a_service_waits_for_work_aside_the_node_goes_on_receiving(node: NodeBase) -> None:
     received: list[str] = []
     go = threading.Event()
 
@@ -283,14 +283,14 @@ def test_while_a_service_waits_for_work_aside_the_node_hears_on(node: NodeBase) 
         go.set()
 
     node.create_service(Trigger, "save", answer, callback_group=node.apart)
-    node.listen(String, "word", receive, qos.stage())
-    client, word = node.create_client(Trigger, "save"), node.create_publisher(String, "word", qos.stage())
-    spin_until(node, [] if word.get_subscription_count() == 0 else [1], 1)
+    node.listen(String, "text", receive, qos.stage())
+    client, publisher = node.create_client(Trigger, "save"), node.create_publisher(String, "text", qos.stage())
+    spin_until(node, [] if publisher.get_subscription_count() == 0 else [1], 1)
     asked = client.call_async(Trigger.Request())
     for _ in range(5):
         rclpy.spin_once(node, timeout_sec=0.05)
     assert not asked.done()
-    word.publish(String(data="one"))
+    publisher.publish(String(data="one"))
     deadline = time.monotonic() + 20.0
     while not asked.done() and time.monotonic() < deadline:
         rclpy.spin_once(node, timeout_sec=0.05)

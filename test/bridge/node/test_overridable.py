@@ -31,7 +31,7 @@ def made() -> Iterator[Made]:
     rclpy.try_shutdown()
 
 
-def heard_with(node: NodeBase, topic: str) -> QoSProfile:
+def received_with(node: NodeBase, topic: str) -> QoSProfile:
     """The QoS with which a topic is listened to, as every other node sees it."""
     (info,) = node.get_subscriptions_info_by_topic(topic)
     return info.qos_profile
@@ -45,19 +45,19 @@ def sent_with(node: NodeBase, topic: str) -> QoSProfile:
 def test_a_subscription_is_as_reliable_as_its_override_says(made: Made) -> None:
     node = made("-p qos_overrides./image.subscription.reliability:=reliable")
     node.listen(String, "image", print, qos.sensor(False))
-    assert heard_with(node, "/image").reliability == qos.stage().reliability
+    assert received_with(node, "/image").reliability == qos.stage().reliability
 
 
 def test_a_publisher_is_as_reliable_as_its_override_says(made: Made) -> None:
-    node = made("-p qos_overrides./word.publisher.reliability:=best_effort")
-    node.create_publisher(String, "word", qos.stage())
-    assert sent_with(node, "/word").reliability == qos.sensor(False).reliability
+    node = made("-p qos_overrides./text.publisher.reliability:=best_effort")
+    node.create_publisher(String, "text", qos.stage())
+    assert sent_with(node, "/text").reliability == qos.sensor(False).reliability
 
 
 def test_without_an_override_a_topic_is_as_it_was_asked_for_and_its_parameters_say_so(made: Made) -> None:
     node = made()
     node.listen(String, "image", print, qos.sensor(False, depth=7))
-    assert heard_with(node, "/image").reliability == qos.sensor(False).reliability
+    assert received_with(node, "/image").reliability == qos.sensor(False).reliability
     start = "qos_overrides./image.subscription."
     found = {name: node.get_parameter(start + name).value for name in ("history", "depth", "reliability")}
     assert found == {"history": "keep_last", "depth": 7, "reliability": "best_effort"}
@@ -72,7 +72,7 @@ def test_an_override_is_of_the_full_name_after_remapping_in_a_file_too(made: Mad
     )
     node = made(f"--params-file {file}", "-r __ns:=/robot", "-r image:=eye")
     node.listen(String, "image", print, qos.sensor(False))
-    assert heard_with(node, "/robot/eye").reliability == qos.stage().reliability
+    assert received_with(node, "/robot/eye").reliability == qos.stage().reliability
     assert node.get_parameter("qos_overrides./robot/eye.subscription.depth").value == 3
 
 
@@ -80,8 +80,8 @@ def test_of_topics_that_are_opened_together_an_override_changes_one(made: Made) 
     node = made("-p qos_overrides./image.subscription.reliability:=reliable")
     profile = qos.sensor(False)
     node.listen_to_first("image", {"image": String, "image/compressed": String}, print, print, profile)
-    assert heard_with(node, "/image").reliability == qos.stage().reliability
-    assert heard_with(node, "/image/compressed").reliability == qos.sensor(False).reliability
+    assert received_with(node, "/image").reliability == qos.stage().reliability
+    assert received_with(node, "/image/compressed").reliability == qos.sensor(False).reliability
     assert profile == qos.sensor(False)
 
 
@@ -89,19 +89,19 @@ def test_a_topic_that_is_opened_again_has_the_same_override(made: Made) -> None:
     node = made("-p qos_overrides./image.subscription.reliability:=reliable")
     for _ in range(2):
         node.listen_to_first("image", {"image": String}, print, print, qos.sensor(False))
-        assert heard_with(node, "/image").reliability == qos.stage().reliability
+        assert received_with(node, "/image").reliability == qos.stage().reliability
         node.hang_up("image")
 
 
 def test_a_second_subscription_with_a_qos_of_its_own_is_left_as_it_is(made: Made) -> None:
-    node = made("-p qos_overrides./word.subscription.reliability:=best_effort")
-    node.create_subscription(String, "word", print, qos.latched(), qos_overriding_options=FIXED)
-    assert heard_with(node, "/word").reliability == qos.latched().reliability
+    node = made("-p qos_overrides./text.subscription.reliability:=best_effort")
+    node.create_subscription(String, "text", print, qos.latched(), qos_overriding_options=FIXED)
+    assert received_with(node, "/text").reliability == qos.latched().reliability
 
 
 def test_the_clock_may_be_overridden_as_in_rclcpp(made: Made) -> None:
     node = made("-p use_sim_time:=true", "-p qos_overrides./clock.subscription.reliability:=reliable")
-    assert heard_with(node, "/clock").reliability == qos.stage().reliability
+    assert received_with(node, "/clock").reliability == qos.stage().reliability
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_an_override_that_is_no_qos_is_refused_in_one_line(made: Made, override:
 
 def test_once_ros_is_shut_down_a_publisher_has_no_reader_and_publishes_nothing(made: Made) -> None:
     node = made()
-    sent = node.create_publisher(String, "words", qos.stage())
+    sent = node.create_publisher(String, "texts", qos.stage())
     sent.publish(String(data="before"))
     rclpy.shutdown()
     sent.publish(String(data="after"))
@@ -133,4 +133,4 @@ def test_once_ros_is_shut_down_a_publisher_has_no_reader_and_publishes_nothing(m
 
 def test_what_is_no_message_is_refused_as_ever(made: Made) -> None:
     with pytest.raises(TypeError):
-        made().create_publisher(String, "words", qos.stage()).publish("no message")  # type: ignore[arg-type]
+        made().create_publisher(String, "texts", qos.stage()).publish("no message")  # type: ignore[arg-type]

@@ -87,7 +87,7 @@ def test_start_values_are_taken_and_a_float_accepts_1(made: Made) -> None:
     ("override", "values"),
     [("threshold:=7.0", {"threshold": 7.0}), ("count:=0", {"count": 0}), ("method:=slow", {"method": "slow"})],
 )
-def test_a_start_value_is_refused_in_the_words_of_params(made: Made, override: str, values: dict[str, object]) -> None:
+def test_a_start_value_is_refused_as_params_refuse_it(made: Made, override: str, values: dict[str, object]) -> None:
     with pytest.raises(ValueError) as expected:
         PotParams().replaced(**values)
     with pytest.raises(ValueError) as got:
@@ -108,15 +108,15 @@ def test_a_start_value_that_nobody_asked_for_is_warned_of(made: Made, capfd: pyt
     assert "see `objreg params`" in second or "see `ros2 param list /pot`" in second
 
 
-def test_a_live_change_is_taken_and_told(made: Made) -> None:
-    node, told = made(), []
-    node.settings.changed = lambda: told.append(node.settings.of(PotParams))
+def test_a_live_change_is_taken_and_reported(made: Made) -> None:
+    node, reported = made(), []
+    node.settings.changed = lambda: reported.append(node.settings.of(PotParams))
     assert set_one(node, "threshold", 1) == "" and set_one(node, "offsets", [], Parameter.Type.DOUBLE_ARRAY) == ""
-    assert told[0].threshold == 1.0 and node.get_parameter("threshold").value == 1.0
+    assert reported[0].threshold == 1.0 and node.get_parameter("threshold").value == 1.0
 
 
 @pytest.mark.parametrize(("name", "value"), [("threshold", 7.0), ("threshold", "x"), ("method", "slow"), ("names", 3)])
-def test_a_live_change_is_refused_in_the_words_of_params(made: Made, name: str, value: object) -> None:
+def test_a_live_change_is_refused_as_params_refuse_it(made: Made, name: str, value: object) -> None:
     node = made()
     with pytest.raises(ValueError) as expected:
         PotParams().replaced(**{name: value})

@@ -22,7 +22,7 @@ def received(publisher: QoSProfile, subscriber: QoSProfile) -> bool:
     return qos_check_compatible(publisher, subscriber)[0] != QoSCompatibility.ERROR
 
 
-def test_best_effort_hears_every_camera_and_reliable_only_reliable_ones() -> None:
+def test_best_effort_receives_every_camera_and_reliable_only_reliable_ones() -> None:
     best_effort, reliable = qos.sensor(reliable=False), qos.sensor(reliable=True)
     for camera in (qos_profile_sensor_data, qos.stage()):
         assert received(camera, best_effort)
@@ -38,7 +38,7 @@ def test_a_camera_may_be_ten_messages_ahead(reliable: bool) -> None:
     assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, 10)
 
 
-def test_rooms_lose_nothing_to_each_other_and_keep_nothing_for_those_who_come_late() -> None:
+def test_stages_lose_nothing_to_each_other_and_keep_nothing_for_those_who_come_late() -> None:
     profile = qos.stage()
     assert received(profile, profile) and not received(profile, qos.latched())
     assert profile.reliability == ReliabilityPolicy.RELIABLE and profile.durability != DurabilityPolicy.TRANSIENT_LOCAL
@@ -56,6 +56,6 @@ def test_what_is_latched_reaches_those_who_come_late_and_those_who_do_not_care()
     assert qos.latched().reliability == ReliabilityPolicy.RELIABLE
 
 
-def test_a_latched_profile_leaves_the_next_one_of_a_room_alone() -> None:
+def test_a_latched_profile_leaves_the_next_one_of_a_stage_alone() -> None:
     qos.latched()
     assert qos.stage().durability != DurabilityPolicy.TRANSIENT_LOCAL

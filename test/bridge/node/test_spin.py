@@ -59,7 +59,7 @@ def ended_well() -> bool:
     return Short.made is not None and Short.made.closed and not rclpy.ok()
 
 
-def test_a_node_that_is_told_to_end_is_closed_with_status_0() -> None:
+def test_a_node_that_is_asked_to_end_is_closed_with_status_0() -> None:
     class Terminated(Short):
         def end(self) -> None:
             os.kill(os.getpid(), signal.SIGTERM)
@@ -194,7 +194,7 @@ def test_what_ros_says_because_it_was_just_shut_down_is_no_bug(is_down: bool, mo
             run(Short, [])
 
 
-def test_what_a_node_hears_leaves_nothing_behind() -> None:
+def test_what_a_node_receives_leaves_nothing_behind() -> None:
     counts: list[int] = []
 
     class Counting(Short):

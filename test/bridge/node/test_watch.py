@@ -36,7 +36,7 @@ def test_an_input_that_speaks_in_time_is_not_reported() -> None:
     assert watch.silent() == {}
 
 
-def test_a_silent_input_without_a_publisher_is_told_how_to_be_remapped() -> None:
+def test_a_silent_input_without_a_publisher_is_reported_with_how_to_remap_it() -> None:
     watch, clock = watched({})
     clock.now = 7.0
     advice = watch.silent()["depth"]
@@ -45,7 +45,7 @@ def test_a_silent_input_without_a_publisher_is_told_how_to_be_remapped() -> None
     assert "-r depth/image:=/your/topic" in advice
 
 
-def test_a_silent_input_with_a_publisher_is_told_to_look_at_its_qos() -> None:
+def test_a_silent_input_with_a_publisher_is_reported_with_a_hint_at_its_qos() -> None:
     watch, clock = watched({"/kinect/points": 1})
     clock.now = 7.0
     assert watch.silent()["depth"].endswith("another QoS: see docs/troubleshooting.md#waits-for-a-topic")

@@ -71,8 +71,8 @@ def test_all_threads_of_a_node_share_a_few_arenas_of_the_allocator(repository: P
     def arenas(how: str) -> int:
         environment = os.environ | {"PYTHONPATH": str(repository), "OPENBLAS_NUM_THREADS": "1"}
         command = [sys.executable, "-c", THREADS, how]
-        told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-        return told.count("<heap nr=")
+        output = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        return output.count("<heap nr=")
 
     assert arenas("shared") < arenas("as they come")
 

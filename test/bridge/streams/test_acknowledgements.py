@@ -50,7 +50,7 @@ def test_the_last_node_that_is_there_is_the_end() -> None:
 
 
 @pytest.mark.parametrize(("nodes", "kind"), [({"detector"}, DEPTH), ({"segmenter", "registrar"}, IMAGE)])
-def test_what_no_node_receipts_is_not_waited_for(nodes: set[str], kind: str) -> None:
+def test_what_no_node_acknowledges_is_not_waited_for(nodes: set[str], kind: str) -> None:
     acknowledgements = Acknowledgements(nodes)
     acknowledgements.send(kind, 5)
     assert acknowledgements.waiting(kind) == 0
@@ -64,14 +64,14 @@ def test_the_same_stamp_may_be_on_its_way_twice() -> None:
     assert acknowledgements.waiting(DEPTH) == 1
 
 
-def test_what_is_later_than_a_stamp_is_told_apart() -> None:
+def test_what_is_later_than_a_stamp_is_counted_apart() -> None:
     acknowledgements = Acknowledgements(ORDER)
     for stamp_ns in (5, 6, 7):
         acknowledgements.send(DEPTH, stamp_ns)
     assert acknowledgements.waiting(DEPTH, after_ns=6) == 1 and acknowledgements.waiting(DEPTH) == 3
 
 
-def test_receipts_of_what_was_not_sent_or_of_strangers_are_left_aside() -> None:
+def test_acknowledgements_of_what_was_not_sent_or_of_strangers_are_left_aside() -> None:
     acknowledgements = Acknowledgements(ORDER)
     acknowledgements.send(DEPTH, 5)
     for text in ("registrar published", "mapper published", "registrar", ""):

@@ -32,15 +32,15 @@ WHOLE = {"closure_refusals", "loop_closures", "object_landmarks"}
 def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     rclpy.init()
-    made = Node("teller", namespace="/fleet/robot1")
+    made = Node("announcer", namespace="/fleet/robot1")
     yield made
     made.destroy_node()
     rclpy.try_shutdown()
 
 
 def topics(node: Node) -> set[str]:
-    told = node.get_publisher_names_and_types_by_node("teller", "/fleet/robot1")
-    return {name.rpartition("/")[2] for name, _ in told} & (COMMON | WHOLE)
+    publishers = node.get_publisher_names_and_types_by_node("announcer", "/fleet/robot1")
+    return {name.rpartition("/")[2] for name, _ in publishers} & (COMMON | WHOLE)
 
 
 def received(node: Node, kind: type, topic: str, profile: Any) -> list[Any]:
@@ -60,27 +60,27 @@ def test_without_objreg_msgs_the_other_topics_are_as_they_are_with_it(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(closures_msg, "LoopClosureMsg", None)
-    telling = Announcements(node)
-    telling.closures([CLOSURE])
-    telling.refusals([REJECTED])
-    telling.landmarks(SEEN, 9, "kinect", {0: "cup"}, 1)
+    announcements = Announcements(node)
+    announcements.closures([CLOSURE])
+    announcements.refusals([REJECTED])
+    announcements.landmarks(SEEN, 9, "kinect", {0: "cup"}, 1)
     assert topics(node) == COMMON
 
 
-def test_with_objreg_msgs_all_that_is_known_is_told_under_the_name_of_the_namespace(node: Node) -> None:
+def test_with_objreg_msgs_all_that_is_known_is_announced_under_the_name_of_the_namespace(node: Node) -> None:
     if closures_msg.LoopClosureMsg is None:
         pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
-    telling = Announcements(node)
+    announcements = Announcements(node)
     assert topics(node) == COMMON | WHOLE
     refusals = received(node, closures_msg.Refusal, "closure_refusals", qos.stage())
     landmarks = received(node, closures_msg.ObjectLandmarks, "object_landmarks", qos.stage())
-    telling.closures([CLOSURE])
+    announcements.closures([CLOSURE])
     closures = received(node, closures_msg.LoopClosureMsg, "loop_closures", qos.latched())  # it comes late
     deadline = time.monotonic() + 20.0
     while node.count_subscribers("closure_refusals") == 0 and time.monotonic() < deadline:
         time.sleep(0.05)
-    telling.refusals([REJECTED])
-    telling.landmarks(SEEN, 9, "kinect", {0: "cup"}, 1)
+    announcements.refusals([REJECTED])
+    announcements.landmarks(SEEN, 9, "kinect", {0: "cup"}, 1)
     wait_for(node, closures, refusals, landmarks)
     assert closures[0].id == closures_msg.closure_id(CLOSURE, "fleet/robot1")
     assert closures[0].to_moment.robot == refusals[0].to_moment.robot == landmarks[0].robot == "fleet/robot1"
@@ -95,15 +95,15 @@ def test_the_state_of_the_localisation_goes_out_where_it_changes_and_once_a_seco
         stamp_ns=0, state=State.TRACKING, reason="", age_s=0.0, odds=1.0, probability=0.5, sigma_m=0.1
     )
     asked = [state]
-    telling = LocalisationAnnouncements(node, lambda: asked[-1])
+    announcements = LocalisationAnnouncements(node, lambda: asked[-1])
     sent: list[int] = []
-    monkeypatch.setattr(telling, "_publisher", SimpleNamespace(publish=sent.append))
+    monkeypatch.setattr(announcements, "_publisher", SimpleNamespace(publish=sent.append))
     monkeypatch.setattr(localisation_msg, "localisation_state", lambda now, *where: (now.state, *where))
     for stamp_ns in (0, 400_000_000, 999_999_999, 1_000_000_000, 1_500_000_000):
-        telling.passed(stamp_ns, "eye")
+        announcements.passed(stamp_ns, "eye")
     assert sent == 2 * [(State.TRACKING, "eye", "fleet/robot1")]
-    telling.look()
+    announcements.look()
     assert len(sent) == 2
     asked.append(replace(state, state=State.LOST))
-    telling.look()
-    assert sent[-1] == (State.LOST, "eye", "fleet/robot1") and telling.now == asked[-1]
+    announcements.look()
+    assert sent[-1] == (State.LOST, "eye", "fleet/robot1") and announcements.now == asked[-1]

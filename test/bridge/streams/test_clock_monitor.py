@@ -13,10 +13,10 @@ PASSED = JUMP_NS // 2  # between two calls of `believe`
 def passed(stamps: list[int]) -> tuple[list[int], list[int]]:
     """The stamps that were admitted, and those that were found alone."""
     alone: list[int] = []
-    course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
-    admitted = [stamp_ns for stamp in stamps for stamp_ns, _ in course.admit(stamp, "item")]
-    admitted += [stamp_ns for stamp_ns, _ in course.release_held()]
-    assert not course.holding
+    monitor: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
+    admitted = [stamp_ns for stamp in stamps for stamp_ns, _ in monitor.admit(stamp, "item")]
+    admitted += [stamp_ns for stamp_ns, _ in monitor.release_held()]
+    assert not monitor.holding
     return admitted, alone
 
 
@@ -50,32 +50,32 @@ def test_of_two_that_leap_to_different_times_the_last_is_asked_for() -> None:
 
 
 def test_one_that_nothing_speaks_against_for_a_while_is_believed() -> None:
-    course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: pytest.fail("it was let go"))
-    assert course.admit(NOW, "old") == [(NOW, "old")] and course.believe(PASSED) == []
-    assert course.admit(5, "new") == []
-    assert course.believe(PASSED) == [] and course.believe(PASSED) == [(5, "new")] and course.believe(PASSED) == []
-    assert course.admit(6, "newer") == [(6, "newer")]
+    monitor: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: pytest.fail("it was let go"))
+    assert monitor.admit(NOW, "old") == [(NOW, "old")] and monitor.believe(PASSED) == []
+    assert monitor.admit(5, "new") == []
+    assert monitor.believe(PASSED) == [] and monitor.believe(PASSED) == [(5, "new")] and monitor.believe(PASSED) == []
+    assert monitor.admit(6, "newer") == [(6, "newer")]
 
 
 @pytest.mark.parametrize("period", [JUMP_NS, 3 * JUMP_NS])
 def test_one_that_leaps_alone_is_not_believed_before_the_next_of_a_slow_stream_can_come(period: int) -> None:
     alone: list[int] = []
-    course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
+    monitor: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
     for stamp in (NOW, NOW + period, NOW + period, 0):
-        course.admit(stamp, "item")
-    assert all(course.believe(PASSED) == [] for _ in range(1 + period // PASSED))
-    assert course.admit(NOW + 3 * period, "next") == [(NOW + 3 * period, "next")] and alone == [0]
+        monitor.admit(stamp, "item")
+    assert all(monitor.believe(PASSED) == [] for _ in range(1 + period // PASSED))
+    assert monitor.admit(NOW + 3 * period, "next") == [(NOW + 3 * period, "next")] and alone == [0]
 
 
 def test_each_one_that_leaps_has_its_own_while() -> None:
     alone: list[int] = []
-    course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
+    monitor: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
     for stamp in (NOW, 0):
-        course.admit(stamp, "item")
-    assert course.believe(PASSED) == []
+        monitor.admit(stamp, "item")
+    assert monitor.believe(PASSED) == []
     for stamp in (NOW + 1, 1):
-        course.admit(stamp, "item")
-    assert course.believe(PASSED) == [] and course.believe(PASSED) == [(1, "item")] and alone == [0]
+        monitor.admit(stamp, "item")
+    assert monitor.believe(PASSED) == [] and monitor.believe(PASSED) == [(1, "item")] and alone == [0]
 
 
 def test_one_that_leaps_back_at_the_end_is_let_go_and_one_that_leaps_ahead_is_believed() -> None:

@@ -18,7 +18,7 @@ from objreg_ros.data.closures import LoopClosure
 CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",), to_session=1)
 
 
-class Hearer:
+class Receiver:
     """Stands in for a node, keeps what it receives, and is given messages by topic."""
 
     def __init__(self, topic: str = "auto", robots: tuple[str, ...] = ()) -> None:
@@ -28,8 +28,8 @@ class Hearer:
         self.withdrawn: list[Any] = []
         self.dropped: list[str] = []
         prefixes = {robot: f"{robot}/" for robot in robots}
-        told = self.taken.append, self.again.append, lambda *told: self.withdrawn.append(told)
-        self.closures = ClosuresIn(self, topic, *told, prefixes)  # type: ignore[arg-type]
+        callbacks = self.taken.append, self.again.append, lambda *withdrawn: self.withdrawn.append(withdrawn)
+        self.closures = ClosuresIn(self, topic, *callbacks, prefixes)  # type: ignore[arg-type]
 
     def listen(self, kind: type, topic: str, received: Callable[[Any], None], profile: Any) -> None:
         self.received[topic] = received
@@ -68,117 +68,117 @@ def whole(closure: LoopClosure, robot: str) -> SimpleNamespace:
 
 def test_what_comes_on_both_topics_is_taken_once_whichever_names_the_robot() -> None:
     for whole_first in (True, False):
-        hearer = Hearer()
-        told = [("loop_closures", whole(CLOSURE, "x")), ("constraints", to_msg.constraint(CLOSURE))]
-        for topic, message in told if whole_first else told[::-1]:
-            hearer.received[topic](message)
-        assert (len(hearer.taken), len(hearer.again)) == (1, 1)
+        receiver = Receiver()
+        messages = [("loop_closures", whole(CLOSURE, "x")), ("constraints", to_msg.constraint(CLOSURE))]
+        for topic, message in messages if whole_first else messages[::-1]:
+            receiver.received[topic](message)
+        assert (len(receiver.taken), len(receiver.again)) == (1, 1)
 
 
 def test_equal_moments_of_two_robots_are_two_closures_and_one_is_taken_back() -> None:
-    hearer = Hearer()
+    receiver = Receiver()
     messages = [whole(CLOSURE, robot) for robot in ("a", "b", "a")]
     for message in messages:
-        hearer.received["loop_closures"](message)
-    assert [told.robots for told in hearer.taken] == [("a", "a"), ("b", "b")] and len(hearer.again) == 1
+        receiver.received["loop_closures"](message)
+    assert [closure.robots for closure in receiver.taken] == [("a", "a"), ("b", "b")] and len(receiver.again) == 1
     messages[1].retracted = True
-    hearer.received["loop_closures"](messages[1])
-    assert hearer.withdrawn == [(CLOSURE.moments, ("b", "b"))]
-    hearer.closures.forget_closure(hearer.taken[0])
-    hearer.received["loop_closures"](messages[0])
-    assert [told.robots for told in hearer.taken[2:]] == [("a", "a")]
+    receiver.received["loop_closures"](messages[1])
+    assert receiver.withdrawn == [(CLOSURE.moments, ("b", "b"))]
+    receiver.closures.forget_closure(receiver.taken[0])
+    receiver.received["loop_closures"](messages[0])
+    assert [closure.robots for closure in receiver.taken[2:]] == [("a", "a")]
 
 
 def test_what_was_taken_back_is_taken_again_when_its_id_comes_again() -> None:
-    hearer, message = Hearer(), whole(CLOSURE, "a")
+    receiver, message = Receiver(), whole(CLOSURE, "a")
     for retracted in (False, True, False, False, True, False):
         message.retracted = retracted
-        hearer.received["loop_closures"](message)
-        hearer.received["constraints"](to_msg.constraint(CLOSURE))
-    assert len(hearer.taken) == 3 and len(hearer.withdrawn) == 2
+        receiver.received["loop_closures"](message)
+        receiver.received["constraints"](to_msg.constraint(CLOSURE))
+    assert len(receiver.taken) == 3 and len(receiver.withdrawn) == 2
 
 
 def test_what_was_known_before_a_restart_is_taken_back_by_its_id() -> None:
-    hearer, message = Hearer(), whole(CLOSURE, "a")
-    hearer.closures.know([replace(CLOSURE, from_robot="a", to_robot="a")])
+    receiver, message = Receiver(), whole(CLOSURE, "a")
+    receiver.closures.know([replace(CLOSURE, from_robot="a", to_robot="a")])
     message.id = closures_msg.closure_id(replace(CLOSURE, from_robot="a", to_robot="a"))
     message.retracted = True
-    hearer.received["loop_closures"](message)
-    assert hearer.withdrawn == [(CLOSURE.moments, ("a", "a"))]
+    receiver.received["loop_closures"](message)
+    assert receiver.withdrawn == [(CLOSURE.moments, ("a", "a"))]
 
 
 def test_the_topic_of_a_robot_names_it() -> None:
-    hearer = Hearer("constraints", ("a", "b"))
-    assert set(hearer.received) == {"constraints", "a/constraints", "b/constraints"}
-    for topic in hearer.received:
-        hearer.received[topic](to_msg.constraint(replace(CLOSURE, to_ns=len(topic))))
-    assert [told.robots for told in hearer.taken] == [("", ""), ("a", "a"), ("b", "b")]
+    receiver = Receiver("constraints", ("a", "b"))
+    assert set(receiver.received) == {"constraints", "a/constraints", "b/constraints"}
+    for topic in receiver.received:
+        receiver.received[topic](to_msg.constraint(replace(CLOSURE, to_ns=len(topic))))
+    assert [closure.robots for closure in receiver.taken] == [("", ""), ("a", "a"), ("b", "b")]
 
 
 def test_what_is_no_constraint_is_dropped_as_malformed() -> None:
-    hearer, message = Hearer("constraints"), to_msg.constraint(CLOSURE)
+    receiver, message = Receiver("constraints"), to_msg.constraint(CLOSURE)
     message.header.frame_id = "camera"
-    hearer.received["constraints"](message)
-    assert hearer.dropped == ["malformed_constraints"] and not hearer.taken
+    receiver.received["constraints"](message)
+    assert receiver.dropped == ["malformed_constraints"] and not receiver.taken
 
 
-def test_on_constraints_the_prefixes_of_frames_name_the_robots_and_both_topics_tell_one_closure() -> None:
+def test_on_constraints_the_prefixes_of_frames_name_the_robots_and_both_topics_carry_one_closure() -> None:
     between = replace(
         CLOSURE, from_robot="r1", to_robot="r2", from_frame_id="r1/camera", to_frame_id="r2/camera", to_session=None
     )
-    hearer = Hearer(robots=("r1", "r2"))
-    hearer.received["constraints"](to_msg.constraint(between))
-    (told,) = hearer.taken
-    assert told.robots == ("r1", "r2") and told.moments == between.moments
+    receiver = Receiver(robots=("r1", "r2"))
+    receiver.received["constraints"](to_msg.constraint(between))
+    (closure,) = receiver.taken
+    assert closure.robots == ("r1", "r2") and closure.moments == between.moments
     message = whole(between, "")
     for end, robot in ((message.from_moment, "r1"), (message.to_moment, "r2")):
         end.robot, end.frame_id = robot, f"{robot}/camera"
-    hearer.received["loop_closures"](message)
-    assert len(hearer.taken) == 1 and len(hearer.again) == 1
+    receiver.received["loop_closures"](message)
+    assert len(receiver.taken) == 1 and len(receiver.again) == 1
 
 
-def test_a_frame_without_a_prefix_is_of_the_robot_whose_topic_tells_it() -> None:
-    hearer = Hearer(robots=("r1", "r2"))
-    hearer.received["r2/constraints"](to_msg.constraint(CLOSURE))
-    assert hearer.taken[0].robots == ("r2", "r2")
+def test_a_frame_without_a_prefix_is_of_the_robot_whose_topic_carries_it() -> None:
+    receiver = Receiver(robots=("r1", "r2"))
+    receiver.received["r2/constraints"](to_msg.constraint(CLOSURE))
+    assert receiver.taken[0].robots == ("r2", "r2")
 
 
 @pytest.mark.parametrize("topic", ["e/constraints", "e/loop_closures"])
 def test_nobody_speaks_for_others_on_a_topic_of_its_own(topic: str) -> None:
-    hearer = Hearer(robots=("a", "b", "e"))
+    receiver = Receiver(robots=("a", "b", "e"))
     forged = replace(CLOSURE, from_robot="a", to_robot="b", from_frame_id="a/camera", to_frame_id="b/camera")
     message = to_msg.constraint(forged)
     if topic.endswith("loop_closures"):
         message = whole(forged, "")
         message.from_moment.robot, message.to_moment.robot = "a", "b"
-    hearer.received[topic](message)
-    assert hearer.dropped == [f"malformed_{topic[2:]}"] and not hearer.taken
+    receiver.received[topic](message)
+    assert receiver.dropped == [f"malformed_{topic[2:]}"] and not receiver.taken
 
 
 def test_a_closure_whose_frame_has_the_prefix_of_another_robot_is_refused() -> None:
-    hearer = Hearer(robots=("a", "b", "e"))
+    receiver = Receiver(robots=("a", "b", "e"))
     message = whole(CLOSURE, "e")
     for end in (message.from_moment, message.to_moment):
         end.frame_id = "b/camera"
     for topic in ("loop_closures", "e/loop_closures"):
-        hearer.received[topic](message)
-    assert hearer.dropped == ["malformed_loop_closures"] * 2 and not hearer.taken
+        receiver.received[topic](message)
+    assert receiver.dropped == ["malformed_loop_closures"] * 2 and not receiver.taken
 
 
 def test_a_closure_of_a_robot_and_another_is_taken_on_the_topic_of_either() -> None:
-    hearer = Hearer("constraints", ("a", "b"))
+    receiver = Receiver("constraints", ("a", "b"))
     for to_ns, topic in ((9, "a/constraints"), (10, "b/constraints"), (11, "constraints")):
         between = replace(CLOSURE, to_ns=to_ns, from_frame_id="a/camera", to_frame_id="b/camera")
-        hearer.received[topic](to_msg.constraint(between))
-    assert [told.robots for told in hearer.taken] == [("a", "b")] * 3
+        receiver.received[topic](to_msg.constraint(between))
+    assert [closure.robots for closure in receiver.taken] == [("a", "b")] * 3
 
 
 def test_a_robot_takes_back_on_its_topic_no_closure_of_others() -> None:
-    hearer = Hearer(robots=("a", "e"))
+    receiver = Receiver(robots=("a", "e"))
     message = whole(CLOSURE, "a")
-    hearer.received["loop_closures"](message)
+    receiver.received["loop_closures"](message)
     message.retracted = True
-    hearer.received["e/loop_closures"](message)
-    assert hearer.withdrawn == []
-    hearer.received["a/loop_closures"](message)
-    assert hearer.withdrawn == [(CLOSURE.moments, ("a", "a"))]
+    receiver.received["e/loop_closures"](message)
+    assert receiver.withdrawn == []
+    receiver.received["a/loop_closures"](message)
+    assert receiver.withdrawn == [(CLOSURE.moments, ("a", "a"))]

@@ -31,7 +31,7 @@ REGISTRAR = RegistrarDiagnostics(
     waiting_poses=0, without_odometry=0, constraints=0, confirmed=0, rejected={"no_candidate": 3}, vetoed=0,
     localisation="", withdrawn=0,
 )  # fmt: skip
-BOOKS = Balance(10, 6, 1, {"overtaken": 3}, {"image": 2}, {"total": (10.0, 20.0)})
+BALANCE = Balance(10, 6, 1, {"overtaken": 3}, {"image": 2}, {"total": (10.0, 20.0)})
 
 
 @pytest.fixture(params=[None])
@@ -55,10 +55,10 @@ def receive(collector: Collector, topic: str, message: Any) -> None:
 def detections(stamp_ns: int, *labels: str) -> Any:
     count = len(labels)
     xyxy = np.tile(np.array([[1, 2, 30, 40]], np.float32), (count, 1))
-    word = Detections(
+    found = Detections(
         xyxy=xyxy, score=np.full(count, 0.5, np.float32), label=labels, image_hw=(480, 640), stamp_ns=stamp_ns
     )
-    return to_msg.detections_table(word, NAMES)
+    return to_msg.detections_table(found, NAMES)
 
 
 def frame(stamp_ns: int, *labels: str) -> Frame:
@@ -95,15 +95,15 @@ def span(xyz: np.ndarray, intrinsics: Intrinsics) -> str:
     return f"{len(xyz)} of {intrinsics.width}"
 
 
-def status(node: str, *own: Diagnostics, balance: Balance = BOOKS) -> DiagnosticArray:
+def status(node: str, *own: Diagnostics, balance: Balance = BALANCE) -> DiagnosticArray:
     return diagnostic(node, Time(), (), CommonDiagnostics.of(balance, 30.0), *own)
 
 
-def test_the_books_of_every_node_are_kept_as_they_were_told_last(collector: Collector) -> None:
+def test_the_counters_of_every_node_are_kept_as_they_were_reported_last(collector: Collector) -> None:
     receive(collector, "/diagnostics", status("/detector", balance=Balance(1, 1, 0, {}, {})))
     receive(collector, "/diagnostics", status("/detector"))
     receive(collector, "/diagnostics", status("/robot/segmenter"))
-    assert collector.counters == {"/detector": BOOKS, "/robot/segmenter": BOOKS} and collector.rejected == {}
+    assert collector.counters == {"/detector": BALANCE, "/robot/segmenter": BALANCE} and collector.rejected == {}
 
 
 def test_refusals_are_counted_by_reason_and_kept_with_their_numbers(collector: Collector) -> None:
@@ -114,7 +114,7 @@ def test_refusals_are_counted_by_reason_and_kept_with_their_numbers(collector: C
     assert [(r.reason, r.from_ns, r.detail) for r in collector.refusals] == [(Reason.NO_CANDIDATE, 5, "none of 3")]
 
 
-def test_the_books_of_strangers_are_left_aside(collector: Collector) -> None:
+def test_the_counters_of_strangers_are_left_aside(collector: Collector) -> None:
     strange = DiagnosticStatus(
         name="motor: temperature", hardware_id="motor", values=[KeyValue(key="hot", value="yes")]
     )
@@ -198,7 +198,7 @@ def test_it_waits_until_something_is_true_or_the_time_is_over(collector: Collect
     assert not collector.spin_until(lambda: False, 0.0)
 
 
-def test_a_service_is_called_and_its_words_come_back(collector: Collector) -> None:
+def test_a_service_is_called_and_its_message_comes_back(collector: Collector) -> None:
     def save(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = True, "3 keyframes"
         return response

@@ -87,7 +87,7 @@ def boxes(count: int) -> Detections:
     )
 
 
-def test_our_table_is_read_with_the_names_that_were_told() -> None:
+def test_our_table_is_read_with_the_names_that_were_announced() -> None:
     node = NodeBase()
     inputs = DetectionsIn(node, "table")  # type: ignore[arg-type]
     node.received["labels"](to_msg.labels(NAMES))
@@ -99,11 +99,11 @@ def test_our_table_is_read_with_the_names_that_were_told() -> None:
     assert node.published == []
 
 
-def test_masks_of_our_table_reach_the_segmenter_as_a_message_and_as_a_word() -> None:
+def test_masks_of_our_table_reach_the_segmenter_as_a_message_and_as_detections() -> None:
     instances = np.zeros((60, 80), np.uint16)
     instances[12:18, 11:15] = 1
-    word = replace(boxes(1), instances=instances)
-    for stated in (word, to_msg.detections_table(word, NAMES)):
+    detections = replace(boxes(1), instances=instances)
+    for stated in (detections, to_msg.detections_table(detections, NAMES)):
         seen = read(DetectionsIn(NodeBase(), "table"), stated, labels=NAMES)  # type: ignore[arg-type]
         np.testing.assert_array_equal(seen.instances, instances)
 
@@ -131,7 +131,7 @@ def test_masks_bring_a_table_of_names_that_is_everywhere_before_their_objects() 
     assert [from_msg.labels(message) for message in node.published] == [{}, {0: "cup"}] and node.acknowledged == [1, 2]
 
 
-def test_a_table_that_another_tells_meanwhile_is_told_again_with_the_names_that_were_met() -> None:
+def test_a_table_that_another_sends_meanwhile_is_sent_again_with_the_names_that_were_met() -> None:
     node = NodeBase()
     inputs = DetectionsIn(node, "auto")  # type: ignore[arg-type]
     inputs._names = {4: "sofa"}

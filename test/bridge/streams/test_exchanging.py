@@ -122,7 +122,7 @@ def test_an_answer_that_waits_for_a_search_keeps_no_subscription_waiting_and_one
     assert len(asked) == 2
 
 
-def test_a_keyframe_that_comes_is_in_the_books_and_handed_on(node: NodeBase) -> None:
+def test_a_keyframe_that_comes_is_counted_and_handed_on(node: NodeBase) -> None:
     taken = list[Delivered]()
     made = Exchanging(node, "/fleet", Spoken(), taken.append)
     made._deliver(7, b"of others")

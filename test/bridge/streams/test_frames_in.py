@@ -54,7 +54,7 @@ def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Frames]:
     rclpy.try_shutdown()
 
 
-def tell(node: Frames, seen: Frame, names: dict[int, str]) -> None:
+def send(node: Frames, seen: Frame, names: dict[int, str]) -> None:
     node._receive("objects")(to_msg.objects(seen, names))
     node._receive("view")(to_msg.view(seen))
     node._receive("view/camera_info")(to_msg.view_camera_info(seen))
@@ -64,9 +64,9 @@ def tell(node: Frames, seen: Frame, names: dict[int, str]) -> None:
 
 def test_a_frame_comes_with_its_names_and_the_pose_that_odometry_has_of_its_camera(node: Frames) -> None:
     node.receive_labels(to_msg.labels({3: "cup"}))
-    word = Odometry(T_odom_body=T_ODOM_BODY, stamp_ns=5 * SECOND, frame_id="r1/odom")
-    node._on_odom(to_msg.odometry(word))
-    tell(node, frame(5, CUP), {3: "cup"})
+    odometry = Odometry(T_odom_body=T_ODOM_BODY, stamp_ns=5 * SECOND, frame_id="r1/odom")
+    node._on_odom(to_msg.odometry(odometry))
+    send(node, frame(5, CUP), {3: "cup"})
     ((seen, T_body_camera),) = node.taken
     assert [item.label for item in seen.objects] == ["cup"] and node.odom_frame == "r1/odom"
     assert np.allclose(seen.T_odom_camera, T_ODOM_BODY @ T_BODY_CAMERA)
@@ -80,7 +80,7 @@ def test_names_that_come_later_are_added_to_those_that_are_known(node: Frames) -
     assert node.names_of("") == {3: "mug", 4: "book"}
 
 
-def test_frames_of_two_cameras_are_told_with_what_to_do(node: Frames) -> None:
+def test_frames_of_two_cameras_are_reported_with_what_to_do(node: Frames) -> None:
     for frame_id in ("front", "front", "rear", "front"):
         node._watch_camera(frame_id)
     (line,) = node.said

@@ -38,7 +38,7 @@ def test_each_camera_of_each_robot_has_a_topic(node: FramesNode) -> None:
     assert {"/fleet/r1/front/labels", "/fleet/r1/rear/labels", "/fleet/r2/labels"} <= received
 
 
-def test_a_keyframe_is_handed_on_with_its_robot_and_is_in_the_books(node: FramesNode) -> None:
+def test_a_keyframe_is_handed_on_with_its_robot_and_is_counted(node: FramesNode) -> None:
     taken = list[FromRobot]()
     received = KeyframesIn(node, PREFIXES, [(), ()], taken.append)
     received._receive("fleet/r1", "r1/keyframes", keyframe(SENT))

@@ -97,13 +97,13 @@ def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
 
 @pytest.fixture
 def player(graph: Graph) -> Iterator[Player]:
-    made = Player({"words": STRING, "image": PICTURE}, clock=True)
+    made = Player({"texts": STRING, "image": PICTURE}, clock=True)
     yield made
     made.close()
 
 
-def word(text: str, stamp_ns: int = 0) -> PlayedMessage:
-    return PlayedMessage("words", stamp_ns, serialize_message(String(data=text)))
+def text_message(text: str, stamp_ns: int = 0) -> PlayedMessage:
+    return PlayedMessage("texts", stamp_ns, serialize_message(String(data=text)))
 
 
 def picture(stamp_ns: int) -> PlayedMessage:
@@ -112,25 +112,27 @@ def picture(stamp_ns: int) -> PlayedMessage:
     )
 
 
-def test_items_are_published_in_their_order_counted_and_told(graph: Graph, player: Player) -> None:
-    graph.receive(String, "words", lambda m: m.data)
-    assert player.wait_for_listeners(["words"], PATIENCE) == []
-    told: list[PlayedMessage] = []
-    items = [word(text) for text in "abc"]
-    player.play(items, None, told.append)
-    assert graph.wait_for(3) == ["a", "b", "c"] and told == items and player.published == {"words": 3}
+def test_items_are_published_in_their_order_counted_and_reported(graph: Graph, player: Player) -> None:
+    graph.receive(String, "texts", lambda m: m.data)
+    assert player.wait_for_listeners(["texts"], PATIENCE) == []
+    reported: list[PlayedMessage] = []
+    items = [text_message(text) for text in "abc"]
+    player.play(items, None, reported.append)
+    assert graph.wait_for(3) == ["a", "b", "c"] and reported == items and player.published == {"texts": 3}
 
 
-def test_a_topic_that_nobody_hears_is_named_and_the_others_are_not(graph: Graph, player: Player) -> None:
-    graph.receive(String, "words", lambda m: m.data)
-    player.wait_for_listeners(["words"], PATIENCE)
-    assert player.wait_for_listeners(["words", "image"], 0.05) == ["/image"]
+def test_a_topic_without_listeners_is_named_and_the_others_are_not(graph: Graph, player: Player) -> None:
+    graph.receive(String, "texts", lambda m: m.data)
+    player.wait_for_listeners(["texts"], PATIENCE)
+    assert player.wait_for_listeners(["texts", "image"], 0.05) == ["/image"]
 
 
 @pytest.mark.parametrize(("rate", "gap", "least"), [(1.0, 0.2, 0.4), (4.0, 0.2, 0.1), (40.0, 60.0, 3.0)])
-def test_items_keep_their_own_pace_times_the_rate(player: Player, rate: float, gap: float, least: float) -> None:
+def test_items_keep_their_own_intervals_divided_by_the_rate(
+    player: Player, rate: float, gap: float, least: float
+) -> None:
     moments: list[float] = []
-    items = [word("a", 5 * 10**9 + round(k * gap * 1e9)) for k in range(3)]
+    items = [text_message("a", 5 * 10**9 + round(k * gap * 1e9)) for k in range(3)]
     player.play(items, rate, lambda _: moments.append(time.monotonic()))
     first, middle, last = moments
     assert last - first >= least - 0.005 and middle - first >= least / 2 - 0.005
@@ -139,7 +141,7 @@ def test_items_keep_their_own_pace_times_the_rate(player: Player, rate: float, g
 
 def test_without_a_rate_nothing_is_waited_for(player: Player) -> None:
     start = time.monotonic()
-    player.play([word("a", k * 60 * 10**9) for k in range(3)], None, lambda _: None)
+    player.play([text_message("a", k * 60 * 10**9) for k in range(3)], None, lambda _: None)
     assert time.monotonic() - start < 60.0
 
 
@@ -147,13 +149,17 @@ def test_the_clock_shows_when_an_item_was_recorded(graph: Graph, player: Player)
     graph.receive(Clock, "/clock", lambda m: headers.stamp_ns(m.clock))
     (ticks,) = (publisher for publisher in player.publishers if publisher.topic_name == "/clock")
     until(lambda: ticks.get_subscription_count() == 1)
-    player.play([word("a", 1_700_000_000_000_000_001), word("b", 1_700_000_000_000_000_009)], None, lambda _: None)
+    player.play(
+        [text_message("a", 1_700_000_000_000_000_001), text_message("b", 1_700_000_000_000_000_009)],
+        None,
+        lambda _: None,
+    )
     assert graph.wait_for(2) == [1_700_000_000_000_000_001, 1_700_000_000_000_000_009]
 
 
 def test_without_a_clock_the_time_is_left_alone(graph: Graph) -> None:
-    player = Player({"words": STRING})
-    player.play([word("a")], None, lambda _: None)
+    player = Player({"texts": STRING})
+    player.play([text_message("a")], None, lambda _: None)
     assert player.count_publishers("/clock") == 0
     player.close()
 
@@ -201,7 +207,7 @@ def test_a_lossless_play_without_nodes_is_refused(player: Player) -> None:
         player.subscribe_to_acknowledgements(0.0)
 
 
-def test_a_node_that_does_not_hear_its_inputs_is_told(
+def test_a_node_that_does_not_receive_its_inputs_is_named(
     graph: Graph, player: Player, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(player_module, "START_S", 0.1)
@@ -212,18 +218,18 @@ def test_a_node_that_does_not_hear_its_inputs_is_told(
         player.subscribe_to_acknowledgements(0.0)
 
 
-def test_a_lossless_play_without_receipts_is_refused(player: Player) -> None:
+def test_a_lossless_play_without_acknowledgements_is_refused(player: Player) -> None:
     with pytest.raises(ValueError, match="expected subscribe_to_acknowledgements before a lossless play"):
         player.play_lossless([], 1.0, print)
 
 
 def test_who_comes_late_still_gets_what_was_latched(graph: Graph) -> None:
-    player = Player({"words": STRING, "static": STRING}, latched={"static"})
+    player = Player({"texts": STRING, "static": STRING}, latched={"static"})
     try:
-        for topic in ("words", "static"):
+        for topic in ("texts", "static"):
             player.play([PlayedMessage(topic, 0, serialize_message(String(data=topic)))], None, print)
         received: list[str] = []
-        for topic in ("words", "static"):
+        for topic in ("texts", "static"):
             player.create_subscription(String, topic, lambda m: received.append(m.data), qos.latched(5))
             player.create_subscription(String, topic, lambda m: received.append(m.data), qos.stage())
         deadline = time.monotonic() + 5.0

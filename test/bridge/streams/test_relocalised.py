@@ -48,8 +48,8 @@ def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Making]:
     made: list[NodeBase] = []
 
     def node(*parameters: str) -> NodeBase:
-        told = [word for one in parameters for word in ("-p", one)]
-        rclpy.init(args=["asked", "--ros-args", *told, "-r", "__ns:=/test_relocalised"])
+        settings = [part for one in parameters for part in ("-p", one)]
+        rclpy.init(args=["asked", "--ros-args", *settings, "-r", "__ns:=/test_relocalised"])
         made.append(NodeBase("asked", RelocalisedParams))
         return made[-1]
 
@@ -82,12 +82,12 @@ def call(node: NodeBase, kind: type, **fields: float) -> Any:
 
 def test_what_becomes_known_is_published_once_and_again_after_it_was_forgotten(make: Making) -> None:
     node, answers = make("map_frame:=hall"), [UNKNOWN]
-    telling = Whereabouts(node, lambda: answers[-1])
+    whereabouts = Whereabouts(node, lambda: answers[-1])
     received = receive(node, "relocalised")
-    telling.mounted(ON_BODY)
+    whereabouts.mounted(ON_BODY)
     for answer in (UNKNOWN, KNOWN, KNOWN, UNKNOWN, KNOWN):
         answers.append(answer)
-        telling.look()
+        whereabouts.look()
         wait_for(node, lambda: False, 0.2)
     assert len(received) == 2 and received[0].header.frame_id == "hall" and received[0].header.stamp.nanosec == 7
     at = received[0].pose.pose.position
@@ -96,30 +96,30 @@ def test_what_becomes_known_is_published_once_and_again_after_it_was_forgotten(m
     assert node.count_publishers("initialpose") == 0
 
 
-def test_initialpose_is_told_where_it_is_asked_for_and_lies_on_the_plane(make: Making) -> None:
+def test_initialpose_is_published_where_it_is_asked_for_and_lies_on_the_plane(make: Making) -> None:
     node = make("initialpose:=true")
     received = []
     node.create_subscription(PoseWithCovarianceStamped, "initialpose", received.append, qos.stage())
-    telling = Whereabouts(node, lambda: KNOWN)
-    telling.mounted(ON_BODY)
+    whereabouts = Whereabouts(node, lambda: KNOWN)
+    whereabouts.mounted(ON_BODY)
     assert wait_for(node, lambda: node.count_subscribers("initialpose") == 1)
     wait_for(node, lambda: False, 0.5)
-    telling.look()
+    whereabouts.look()
     assert wait_for(node, lambda: bool(received))
     assert received[0].pose.pose.position.z == 0.0 and received[0].header.frame_id == "earlier_map"
 
 
 @pytest.mark.parametrize(("by_odometry", "mount"), [(False, ON_BODY), (True, None)])
-def test_no_initialpose_is_told_of_a_map_that_may_be_tilted_or_of_a_camera(
+def test_no_initialpose_is_published_of_a_map_that_may_be_tilted_or_of_a_camera(
     by_odometry: bool, mount: np.ndarray | None, make: Making
 ) -> None:
     node, said, received = make("initialpose:=true"), list[str](), list[object]()
     node.throttled._write = said.append
     node.create_subscription(PoseWithCovarianceStamped, "initialpose", received.append, qos.stage())
-    telling = Whereabouts(node, lambda: (replace(FOUND, by_odometry=by_odometry), "known"))
-    telling.mounted(mount)
+    whereabouts = Whereabouts(node, lambda: (replace(FOUND, by_odometry=by_odometry), "known"))
+    whereabouts.mounted(mount)
     assert wait_for(node, lambda: node.count_subscribers("initialpose") == 1)
-    telling.look()
+    whereabouts.look()
     assert not wait_for(node, lambda: bool(received), 0.5)
     assert "expected odometry in both sessions" in said[0] and "set T_base_camera" in said[0]
 

@@ -61,8 +61,8 @@ def test_the_nearest_within_the_slop_is_taken_once_it_is_known() -> None:
 def test_what_was_left_out_is_matched_like_the_rest_and_says_so() -> None:
     sync = Synchroniser((Stream("image"), Stream("boxes", slop_ns=10)))
     found = []
-    for stamp_ns, word in ((100, "b"), (133, Drop.SURPLUS), (166, Drop.SURPLUS), (200, "b")):
-        found += sync.add_item("boxes", stamp_ns, word)
+    for stamp_ns, item in ((100, "b"), (133, Drop.SURPLUS), (166, Drop.SURPLUS), (200, "b")):
+        found += sync.add_item("boxes", stamp_ns, item)
         found += sync.add_item("image", stamp_ns + 5, "i")
     found += sync.flush()
     assert [(match.stamp_ns, match.is_surplus) for match in found] == [
@@ -228,7 +228,7 @@ def test_what_comes_fast_waits_long_enough_for_a_slow_partner() -> None:
     assert sync.queues["depth"].waiting * step_ns <= PATIENCE_NS + step_ns
 
 
-def test_large_things_make_room_however_short_they_have_waited() -> None:
+def test_large_items_are_dropped_however_short_they_have_waited() -> None:
     sync = Synchroniser((Stream("cloud", depth=3), Stream("detections")))
     for t in range(20):
         sync.add_item("cloud", t, SimpleNamespace(data=range(MOST_BYTES // 5)))
@@ -246,7 +246,7 @@ def test_one_that_comes_late_is_passed_over_and_nothing_that_waits_is_lost() -> 
     assert sync.queues["odom"].dropped == sync.queues["image"].dropped == {"late": 1} and accounts_hold(sync)
 
 
-def test_what_a_match_lacks_is_told() -> None:
+def test_what_a_match_lacks_is_named() -> None:
     streams = [Stream("image"), Stream("depth", slop_ns=10), Stream("odom", Need.OPTIONAL), Stream("k", Need.LATCHED)]
     sync = Synchroniser(streams)
     assert [stream.name for stream in sync.lacking(100)] == ["depth", "k"]
@@ -371,12 +371,12 @@ def test_nothing_is_lost_in_silence_whatever_comes(arrivals: list[tuple[str, int
     assert sync.queues["image"].matched == sync.queues["depth"].matched == len(found)
 
 
-def test_every_drop_is_told_with_its_stream_stamp_and_reason() -> None:
-    told: list[tuple[str, int, str]] = []
-    sync = Synchroniser(EXACT, on_drop=lambda name, stamp_ns, why: told.append((name, stamp_ns, why)))
+def test_every_drop_is_reported_with_its_stream_stamp_and_reason() -> None:
+    reported: list[tuple[str, int, str]] = []
+    sync = Synchroniser(EXACT, on_drop=lambda name, stamp_ns, why: reported.append((name, stamp_ns, why)))
     for name, stamp in (("image", 10), ("image", JUMP_NS), ("depth", JUMP_NS), ("depth", JUMP_NS + 30)):
         sync.add_item(name, stamp, stamp)
     for stamp in (0, 1):
         sync.add_item("image", stamp, stamp)
-    assert told == [("image", 10, "unmatched"), ("depth", JUMP_NS + 30, "time_jump")]
-    assert sum(q.dropped.total() for q in sync.queues.values()) == len(told)
+    assert reported == [("image", 10, "unmatched"), ("depth", JUMP_NS + 30, "time_jump")]
+    assert sum(q.dropped.total() for q in sync.queues.values()) == len(reported)

@@ -191,12 +191,12 @@ def test_streams_may_be_matched_anew_and_keep_what_is_latched(node: Pairs) -> No
     assert by_key(*node.own_diagnostics()) == {"c received": 1}
 
 
-def test_diagnostics_tell_what_the_other_streams_brought(node: Pairs) -> None:
+def test_diagnostics_state_what_the_other_streams_brought(node: Pairs) -> None:
     node.start_matching([Stream("a"), Stream("b"), Stream("c", Need.LATCHED)])
     node.feed("c", 0, "c")
     node.feed("b", 5, "b5")
     node.feed("b", 6, "b6")
     node.feed("a", 6, "a6")
     node.wait()
-    told = by_key(*node.own_diagnostics())
-    assert told == {"b received": 2, "b unmatched": 1, "c received": 1}
+    values = by_key(*node.own_diagnostics())
+    assert values == {"b received": 2, "b unmatched": 1, "c received": 1}
