@@ -49,31 +49,31 @@ class Graph:
         self.counters: dict[str, Balance] = {}
         self.connected: dict[str, dict[str, int]] = {}
         self.status: dict[str, DiagnosticStatus] = {}  # of each node, the last
-        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._take_books, qos.stage())
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._take_status, qos.stage())
 
     # Processes
 
-    def command(self, room: str, *ros_args: str) -> list[str]:
+    def command(self, stage: str, *ros_args: str) -> list[str]:
         arguments = [word for pair in ros_args for word in pair.split(" ", 1)]
-        module = "objreg_mapper.node" if room == "mapper" else f"objreg_ros.{room}.node"
+        module = "objreg_mapper.node" if stage == "mapper" else f"objreg_ros.{stage}.node"
         return [sys.executable, "-m", module, "--ros-args", *arguments]
 
     def environment(self) -> dict[str, str]:
         path = os.pathsep.join(filter(None, (str(REPOSITORY), os.environ.get("PYTHONPATH"))))
         return {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "PYTHONPATH": path}
 
-    def start(self, name: str, room: str, *ros_args: str) -> None:
+    def start(self, name: str, stage: str, *ros_args: str) -> None:
         """Start a node as a process; its output goes to `log`."""
-        self._start(name, self.command(room, *ros_args))
+        self._start(name, self.command(stage, *ros_args))
 
     def start_module(self, name: str, module: str, *ros_args: str) -> None:
         """Start a module that is a node, as an adapter's."""
         arguments = [word for pair in ros_args for word in pair.split(" ", 1)]
         self._start(name, [sys.executable, "-m", module, "--ros-args", *arguments])
 
-    def start_composed(self, *words: str) -> None:
+    def start_composed(self, *arguments: str) -> None:
         """Start all nodes in one process, called ``graph``."""
-        self._start("graph", [sys.executable, "-m", "objreg_tools.graph", *words])
+        self._start("graph", [sys.executable, "-m", "objreg_tools.graph", *arguments])
 
     def _start(self, name: str, command: list[str]) -> None:
         with self._log(name).open("wb") as log:
@@ -150,7 +150,7 @@ class Graph:
         return of_node and message.frame_id != f"{node} followed"  # whose end is yet to come
 
     def balance(self, name: str, received: int) -> Balance:
-        """The counters of a node once it has told that it received so many."""
+        """The counters of a node once it has reported that it received so many."""
         self.wait_for(
             lambda: (
                 name in self.counters and self.counters[name].received == received and not self.counters[name].waiting
@@ -159,7 +159,7 @@ class Graph:
         )
         return self.counters[name]
 
-    def _take_books(self, message: DiagnosticArray) -> None:
+    def _take_status(self, message: DiagnosticArray) -> None:
         for status in message.status:
             name = status.name.removesuffix(": frames")
             self.status[name] = status
@@ -170,6 +170,6 @@ class Graph:
 
 
 def _connected_of(status: DiagnosticStatus) -> dict[str, int]:
-    """Full topic name → the publishers that a node is connected to, as its status tells."""
-    told = ((pair.key, pair.value) for pair in status.values if pair.key.startswith(CONNECTED))
-    return {key.removeprefix(CONNECTED): int(value) for key, value in told}
+    """Full topic name → the publishers that a node is connected to, as its status states."""
+    pairs = ((pair.key, pair.value) for pair in status.values if pair.key.startswith(CONNECTED))
+    return {key.removeprefix(CONNECTED): int(value) for key, value in pairs}

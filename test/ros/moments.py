@@ -40,7 +40,7 @@ def recorded(path: Path, count: int, step: int) -> list[Moment]:
 
 
 def _moment(messages: list[tuple[str, Any]]) -> Moment:
-    """The words of recorded messages, written again with rclpy's classes."""
+    """The contents of recorded messages, written again with rclpy's classes."""
     said = dict(messages)
     colour = from_msg.image(said["image"])
     depth = from_msg.depth_image(said["depth/image"], said["camera_info"])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The black box beside live nodes: what it writes has the inputs as they came, and gives the same verdict offline.
 
-The same verdict: both cut the same keyframes, and say the same word for the same pairs, a constraint or the reason of a
-refusal, where the file holds all since the registrar began.
+The same verdict: both cut the same keyframes, and give the same outcome for the same pairs, a constraint or the reason
+of a refusal, where the file holds all since the registrar began.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ NODES = ("detector", "segmenter", "registrar")
 
 
 @pytest.fixture(scope="module")
-def room(graph: Graph, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def orbit(graph: Graph, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated room, around one table of which the camera goes."""
-    folder = tmp_path_factory.mktemp("room") / "bag"
+    folder = tmp_path_factory.mktemp("orbit") / "bag"
     words = ("--scenario", "orbit", "--seed", "1", "--frames", "50", "--rate", "10", "--intrinsics", "qvga")
     objreg(graph, "simulate", str(folder), *words)
     return folder
 
 
 @pytest.fixture(scope="module")
-def played(graph: Graph, room: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The folder of a black box behind a lossless replay of the room."""
+def played(graph: Graph, orbit: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The folder of a black box behind a lossless replay of the orbit."""
     folder = tmp_path_factory.mktemp("boxes")
     for node in NODES:
         graph.start(node, node, "-p reliable:=true")
@@ -53,7 +53,7 @@ def played(graph: Graph, room: Path, tmp_path_factory: pytest.TempPathFactory) -
     for topic, kind in (("refusals", DiagnosticArray), ("acceptances", DiagnosticArray), ("landmarks", PointCloud2)):
         graph.receive(kind, topic)
     graph.wait_for(lambda: {f"/{name}" for name in ("blackbox", *NODES)} <= graph.counters.keys(), START_S)
-    objreg(graph, "replay", str(room), "--lossless", "--wait", str(START_S))
+    objreg(graph, "replay", str(orbit), "--lossless", "--wait", str(START_S))
     call(graph, Trigger, "registrar/save")  # ends the last keyframe; a temporary store is not saved
     wait_for_quiet(graph)
     yield folder
@@ -109,10 +109,10 @@ def test_a_run_on_the_file_gives_the_verdicts_of_the_live_graph(graph: Graph, pl
     assert offline == live and ACCEPTED in live.values() and len(set(live.values())) > 3
 
 
-def test_the_inputs_are_in_the_file_byte_for_byte(graph: Graph, played: Path, room: Path) -> None:
+def test_the_inputs_are_in_the_file_byte_for_byte(graph: Graph, played: Path, orbit: Path) -> None:
     done, path = call(graph, Trigger, "blackbox/write")
     assert done, path
-    with open_recording(room) as recording, open_recording(Path(path)) as file:
+    with open_recording(orbit) as recording, open_recording(Path(path)) as file:
         for topic in INPUTS:
             sent = [record.cdr for record in recording.records([topic])]
             kept = [record.cdr for record in file.records([topic])]

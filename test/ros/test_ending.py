@@ -20,7 +20,7 @@ from objreg_ros.keyframes.own_size import OBJECTS
 from objreg_ros.memory.store import Store
 
 from .graph import Graph
-from .test_relocalised import BESIDE, HERE, MOUNT, frame, tell
+from .test_relocalised import BESIDE, HERE, MOUNT, frame, send_frame
 
 pytestmark = pytest.mark.ros
 
@@ -53,13 +53,13 @@ def test_a_signal_during_a_search_ends_with_status_0_says_nothing_and_loses_noth
     fresh: Graph, tmp_path: Path, how: signal.Signals
 ) -> None:
     store = tmp_path / "place.db"
-    words = fresh.command("registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
+    command = fresh.command("registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
     fresh.receive(Header, "finished")
-    fresh._start("registrar", [sys.executable, "-c", LONG, *words[words.index("--ros-args") :]])
+    fresh._start("registrar", [sys.executable, "-c", LONG, *command[command.index("--ros-args") :]])
     frames = [frame(10 + 3 * k, T, T) for k, T in enumerate((HERE, BESIDE, HERE))]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for one in frames:
-        tell(fresh, one, names)
+        send_frame(fresh, one, names)
         if one is not frames[-1]:  # which completes the keyframe whose search does not end
             fresh.answer("registrar", one.stamp_ns)
     fresh.wait_for(lambda: "searching" in fresh.log("registrar"), what="the search")
@@ -77,9 +77,9 @@ def test_frames_of_hundreds_of_objects_hold_up_neither_a_registrar_nor_its_end(f
     fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
     crowds = [crowded(10 + 3 * k, T) for k, T in enumerate((HERE, BESIDE, HERE, BESIDE))]
     for one in crowds[:3]:
-        tell(fresh, one, {0: "cup"})
+        send_frame(fresh, one, {0: "cup"})
         assert fresh.answer("registrar", one.stamp_ns) == "published"
-    tell(fresh, crowds[3], {0: "cup"})
+    send_frame(fresh, crowds[3], {0: "cup"})
     code = fresh.stop("registrar")
     assert code == 0, fresh.log("registrar")
     with closing(Store(store, read_only=True)) as stored:

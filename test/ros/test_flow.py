@@ -51,7 +51,7 @@ def running(graph: Graph, tiny_model: Path) -> Graph:
 
 
 def connected(graph: Graph) -> bool:
-    """Whether the rooms are connected to each other."""
+    """Whether the nodes are connected to each other."""
     inner = {
         "/segmenter": ("/detections_table", "/labels"),
         "/registrar": ("/labels", *(f"/{topic}" for topic in WIRE)),
@@ -72,18 +72,18 @@ def call(graph: Graph, kind: type, name: str, **values: object) -> tuple[bool, s
     return future.result().success, future.result().message
 
 
-def test_every_frame_passes_three_nodes_and_every_node_balances_its_books(
+def test_every_frame_passes_three_nodes_and_every_node_balances_its_counters(
     running: Graph, moments: list[Moment]
 ) -> None:
-    running.wait_for(lambda: connected(running), START_S, "the rooms to find each other")
+    running.wait_for(lambda: connected(running), START_S, "the nodes to find each other")
     for moment in moments:
         feed(running, moment)
-        assert [running.answer(room, moment.stamp_ns) for room in STAGES] == ["published"] * 3, running.log(
+        assert [running.answer(stage, moment.stamp_ns) for stage in STAGES] == ["published"] * 3, running.log(
             "/registrar"
         )
-    for room in STAGES:
-        counters = running.balance(f"/{room}", received=len(moments))
-        assert (counters.published, counters.dropped, counters.lost) == (len(moments), {}, {}), room
+    for stage in STAGES:
+        counters = running.balance(f"/{stage}", received=len(moments))
+        assert (counters.published, counters.dropped, counters.lost) == (len(moments), {}, {}), stage
     stamps = [moment.stamp_ns for moment in moments]
     for topic in WIRE:
         assert [headers.stamp_ns(message) for message in running.received[topic]] == stamps, topic
@@ -95,7 +95,7 @@ def test_a_jump_back_in_time_goes_on_like_a_looped_bag(running: Graph, moments: 
     for moment in moments[:3]:
         running.received["finished"].clear()
         feed(running, moment)
-        assert [running.answer(room, moment.stamp_ns) for room in STAGES] == ["published"] * 3
+        assert [running.answer(stage, moment.stamp_ns) for stage in STAGES] == ["published"] * 3
     assert len(running.received["objects"]) == before + 3
 
 
@@ -128,4 +128,4 @@ def test_a_late_subscriber_still_gets_the_labels(running: Graph) -> None:
 
 
 def test_an_interrupt_ends_every_node_with_status_0(running: Graph) -> None:
-    assert {name: running.stop(name) for name in list(running.processes)} == {f"/{room}": 0 for room in STAGES}
+    assert {name: running.stop(name) for name in list(running.processes)} == {f"/{stage}": 0 for stage in STAGES}

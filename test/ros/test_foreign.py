@@ -32,13 +32,13 @@ pytestmark = pytest.mark.ros
 
 FRAMES, RATE_HZ = 14, 2.0
 STAGES = ("segmenter", "registrar")
-Told = Callable[[SimulationTruth, TrueFrame], dict[str, Any]]  # a frame → messages by topic
+MessagesOf = Callable[[SimulationTruth, TrueFrame], dict[str, Any]]  # a frame → messages by topic
 
 
 @pytest.fixture(scope="module")
-def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated round of a room that begins a second time."""
-    path = tmp_path_factory.mktemp("room") / "recording"
+    path = tmp_path_factory.mktemp("simulated") / "recording"
     simulate(
         path, "look-alikes", 11, FRAMES, RATE_HZ, sensors=sensors_of(camera_of("qvga", None), False, (), "kinect_v1")
     )
@@ -86,21 +86,21 @@ def as_masks(truth: SimulationTruth, frame: TrueFrame) -> dict[str, Any]:
     return {"masks": message}
 
 
-def closures(graph: Graph, path: Path, told: Told, **first: Any) -> list[LoopClosure]:
+def closures(graph: Graph, path: Path, messages_of: MessagesOf, **first: Any) -> list[LoopClosure]:
     """The constraints of segmenter and registrar that get a camera, odometry, and the objects of another node."""
     truth = read_truth(path)
     graph.receive(Header, "finished")
     graph.receive(OdometryMessage, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
     graph.start("segmenter", "segmenter", "-p reliable:=true")
     graph.start("registrar", "registrar", "-p reliable:=true", "-p threads:=1")
-    graph.wait_for(lambda: bool(graph.connected.get("/registrar", {}).get("/objects")), START_S, "the rooms to meet")
+    graph.wait_for(lambda: bool(graph.connected.get("/registrar", {}).get("/objects")), START_S, "the nodes to connect")
     for topic, message in first.items():
         graph.publish(topic, message)
     for moment in recorded(path, FRAMES, step=1):
         frame = truth.frame(moment.stamp_ns)
         assert frame is not None
-        feed(graph, moment, {**told(truth, frame), "odom": odometry(frame)})
-        assert [graph.answer(room, moment.stamp_ns) for room in STAGES] == ["published"] * 2, graph.log("segmenter")
+        feed(graph, moment, {**messages_of(truth, frame), "odom": odometry(frame)})
+        assert [graph.answer(stage, moment.stamp_ns) for stage in STAGES] == ["published"] * 2, graph.log("segmenter")
     client = graph.node.create_client(Trigger, "registrar/save")
     graph.wait_for(client.service_is_ready, START_S, "the registrar's service")
     saved = client.call_async(Trigger.Request())
@@ -122,37 +122,37 @@ def false_ones(path: Path, found: list[LoopClosure]) -> list[LoopClosure]:
     return [one for one in found if (error := truth.error(one)) is None or not within(error, FALSE)]
 
 
-def test_masks_of_anyone_make_true_constraints(fresh: Graph, room: Path) -> None:
-    found = closures(fresh, room, as_masks)
-    assert found and not false_ones(room, found)
+def test_masks_of_anyone_make_true_constraints(fresh: Graph, simulated: Path) -> None:
+    found = closures(fresh, simulated, as_masks)
+    assert found and not false_ones(simulated, found)
 
 
 @pytest.mark.skipif(vision_to_msg.Detection2DArray is None, reason="vision_msgs is not installed")
-def test_boxes_of_anyone_make_the_constraints_of_our_own_table(domain: int, tmp_path: Path, room: Path) -> None:
+def test_boxes_of_anyone_make_the_constraints_of_our_own_table(domain: int, tmp_path: Path, simulated: Path) -> None:
     found: dict[str, list[LoopClosure]] = {}
-    labels = {"labels": to_msg.labels(names_of(read_truth(room)))}
-    for name, told, first in (("table", as_table, labels), ("vision", as_vision, {})):
+    labels = {"labels": to_msg.labels(names_of(read_truth(simulated)))}
+    for name, messages_of, first in (("table", as_table, labels), ("vision", as_vision, {})):
         (tmp_path / name).mkdir()
         graph = Graph(domain, tmp_path / name)
         try:
-            found[name] = closures(graph, room, told, **first)
+            found[name] = closures(graph, simulated, messages_of, **first)
         finally:
             graph.close()
     ends = {name: [(one.from_ns, one.to_ns) for one in of] for name, of in found.items()}
-    assert ends["table"] and ends["vision"] == ends["table"] and not false_ones(room, found["vision"])
+    assert ends["table"] and ends["vision"] == ends["table"] and not false_ones(simulated, found["vision"])
     for ours, theirs in zip(found["table"], found["vision"], strict=True):
         assert np.allclose(ours.T_from_to, theirs.T_from_to, atol=1e-6)
 
 
 @pytest.mark.skipif(vision_to_msg.Detection2DArray is None, reason="vision_msgs is not installed")
-def test_names_of_masks_are_known_to_everybody_before_their_objects_are(fresh: Graph, room: Path) -> None:
+def test_names_of_masks_are_known_to_everybody_before_their_objects_are(fresh: Graph, simulated: Path) -> None:
     from vision_msgs.msg import Detection3DArray, LabelInfo, VisionClass
 
-    objects = read_truth(room).objects[0].values()
-    told = LabelInfo(class_map=[VisionClass(class_id=one.instance, class_name=one.label) for one in objects])
+    objects = read_truth(simulated).objects[0].values()
+    label_info = LabelInfo(class_map=[VisionClass(class_id=one.instance, class_name=one.label) for one in objects])
     fresh.receive(String, "labels", qos.latched())
     fresh.receive(Detection3DArray, "detections_3d")
-    closures(fresh, room, as_masks, label_info=told)
+    closures(fresh, simulated, as_masks, label_info=label_info)
     names = set(from_msg.labels(fresh.received["labels"][-1]).values())
     assert names and names <= {one.label for one in objects}
     fresh.wait_for(lambda: len(fresh.received["detections_3d"]) == FRAMES, what="solids")

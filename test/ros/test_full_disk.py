@@ -15,7 +15,7 @@ from std_msgs.msg import Header
 from objreg_ros.memory.store import Store
 
 from .graph import START_S, Graph
-from .test_relocalised import BESIDE, HERE, MOUNT, frame, tell
+from .test_relocalised import BESIDE, HERE, MOUNT, frame, send_frame
 
 pytestmark = [pytest.mark.ros, pytest.mark.skipif(os.getuid() != 0, reason="only root may mount a small disk")]
 SIZE = "1M"  # of a keyframe or two
@@ -45,7 +45,7 @@ def feed(graph: Graph, first: int, count: int) -> list[str]:
     answers = []
     for k in range(first, first + count):
         seen = frame(10 + 3 * k, *((HERE, HERE) if k % 2 else (BESIDE, BESIDE)))
-        tell(graph, seen, dict(enumerate(sorted({cloud.label for cloud in seen.objects}))))
+        send_frame(graph, seen, dict(enumerate(sorted({cloud.label for cloud in seen.objects}))))
         answers.append(graph.answer("registrar", seen.stamp_ns))
     return answers
 

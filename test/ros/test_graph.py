@@ -33,8 +33,8 @@ def fresh(domain: int, tmp_path: Path) -> Iterator[Graph]:
 
 
 def compose(graph: Graph, model: Path, *more: str) -> None:
-    words = (f"detector:model:={model}", "reliable:=true", *more)
-    graph.start_composed("--ros-args", *(part for word in words for part in ("-p", word)))
+    parameters = (f"detector:model:={model}", "reliable:=true", *more)
+    graph.start_composed("--ros-args", *(part for parameter in parameters for part in ("-p", parameter)))
 
 
 def test_a_lossless_replay_brings_every_frame_through_one_process(
@@ -43,14 +43,14 @@ def test_a_lossless_replay_brings_every_frame_through_one_process(
     compose(fresh, tiny_model)
     folder = tum_folder(tmp_path / "tum", frames=12)
     output = objreg(fresh, "replay", str(folder), *LOSSLESS)
-    for room in STAGES:
-        assert f"{room}: 12 published\n" in output
-        counters = fresh.balance(f"/{room}", received=12)
+    for stage in STAGES:
+        assert f"{stage}: 12 published\n" in output
+        counters = fresh.balance(f"/{stage}", received=12)
         assert (counters.published, counters.dropped, counters.lost) == (12, {}, {})
     assert fresh.stop("graph") == 0
 
 
-def test_pictures_that_a_pace_leaves_out_are_handed_on_as_surplus_whatever_the_stamps_of_depth(
+def test_pictures_that_the_highest_rate_leaves_out_are_handed_on_as_surplus_whatever_the_stamps_of_depth(
     fresh: Graph, tiny_model: Path, tmp_path: Path
 ) -> None:
     compose(fresh, tiny_model, "detector:max_rate:=5.0")
@@ -59,7 +59,9 @@ def test_pictures_that_a_pace_leaves_out_are_handed_on_as_surplus_whatever_the_s
     assert "detector: 6 dropped surplus, 6 published\n" in output
 
 
-def test_who_listens_from_outside_hears_what_the_rooms_say(fresh: Graph, tiny_model: Path, tmp_path: Path) -> None:
+def test_who_listens_from_outside_receives_what_the_nodes_publish(
+    fresh: Graph, tiny_model: Path, tmp_path: Path
+) -> None:
     topics = "detections_table", "objects", "view"
     for topic in topics:
         fresh.receive(PointCloud2, topic)

@@ -38,8 +38,8 @@ def running(graph: Graph, tiny_model: Path) -> Graph:
     graph.start("/cut/segmenter", "segmenter", "-r __ns:=/cut", "-p reliable:=true")
     graph.start("/lay/registrar", "registrar", "-r __ns:=/lay", "-p reliable:=true")
     graph.start("/map/mapper", "mapper", "-r __ns:=/map", "-p reliable:=true")
-    for room in ("eye", "cut", "lay", "map"):
-        graph.receive(Header, f"{room}/finished")
+    for namespace in ("eye", "cut", "lay", "map"):
+        graph.receive(Header, f"{namespace}/finished")
     return graph
 
 

@@ -66,7 +66,7 @@ def gravity_of(graph: Graph, count: int) -> Array:
     return np.array([vector.x, vector.y, vector.z])
 
 
-def test_a_segmenter_tells_the_gravity_that_an_imu_feels_whatever_else_the_imu_says(running: Graph) -> None:
+def test_a_segmenter_gives_the_gravity_that_an_imu_feels_whatever_else_the_imu_says(running: Graph) -> None:
     tilt = np.radians(20.0)
     felt = (9.81 * np.sin(tilt), 0.0, 9.81 * np.cos(tilt))  # the camera looks up by 20 degrees
     start = 10 * SECOND
@@ -86,11 +86,11 @@ def test_a_segmenter_tells_the_gravity_that_an_imu_feels_whatever_else_the_imu_s
     assert falls / confidence == pytest.approx([0.0, np.cos(tilt), -np.sin(tilt)], abs=1e-3)
     assert gravity_sigma_deg(confidence) < 2.5
 
-    def told() -> dict[str, str]:
+    def values() -> dict[str, str]:
         return {pair.key: pair.value for pair in running.status["/segmenter"].values}
 
-    running.wait_for(lambda: told().get("gravity from imu") == "1", what="diagnostics of gravity")
-    assert told()["depth noise (a Kinect v1 has 1)"] == "0.00"  # a wall without any
+    running.wait_for(lambda: values().get("gravity from imu") == "1", what="diagnostics of gravity")
+    assert values()["depth noise (a Kinect v1 has 1)"] == "0.00"  # a wall without any
     expected = {"malformed imu": "1", "imu no_acceleration": "1", "imu norm": "1", "imu late": "1"}
-    assert {key: told().get(key) for key in expected} == expected
+    assert {key: values().get(key) for key in expected} == expected
     assert running.alive("/segmenter")

@@ -50,7 +50,7 @@ def launch_file(repository: Path, name: str = "objreg") -> dict[str, Any]:
 
 @pytest.fixture
 def replayed(repository: Path, said: dict[str, Any]) -> Callable[..., list[str]]:
-    """The words of the player behind ``replay`` for some arguments of replay.launch.py."""
+    """The arguments of the player behind ``replay`` for some arguments of replay.launch.py."""
     file = launch_file(repository, "replay")
     nothing = {**said, **dict.fromkeys(file["OPTIONS"], ""), "recording": "my_bag"}
     return lambda **arguments: file["_command"]({**nothing, **arguments})[4:]
@@ -91,8 +91,8 @@ def test_the_nodes_of_one_process_each_get_their_own_parameters(repository: Path
     file = launch_file(repository)
     given = {**said, "model": "my.onnx", "source": "points", "params_file": "my.yaml"}
     users, ours = file["_shared"](file["NODES"], given)
-    told = json.loads(Path(ours).read_text())
-    assert users == "my.yaml" and told == {
+    written = json.loads(Path(ours).read_text())
+    assert users == "my.yaml" and written == {
         "/**/detector": {"ros__parameters": {"model": "my.onnx"}},
         "/**/segmenter": {"ros__parameters": {"source": "points"}},
     }
@@ -101,13 +101,13 @@ def test_the_nodes_of_one_process_each_get_their_own_parameters(repository: Path
 
 def test_rviz_gets_the_namespace_and_the_topics_of_the_nodes(repository: Path, said: dict[str, Any]) -> None:
     rviz, made = launch_file(repository)["_rviz"], []
-    rviz.__globals__.update(get_package_prefix=lambda package: "/", Node=lambda **words: made.append(words))
+    rviz.__globals__.update(get_package_prefix=lambda package: "/", Node=lambda **options: made.append(options))
     alike = {"namespace": "robot", "remappings": [("/tf", "tf"), ("image", "/kinect/rgb")]}
     assert rviz(said, alike) == [] and made == []
     rviz({**said, "rviz": "true", "use_sim_time": "true"}, alike)
-    (words,) = made
-    assert words["arguments"] == ["-d", str(repository / "config/objreg.rviz")]
-    assert {**words, **alike, "parameters": [{"use_sim_time": True}]} == words
+    (options,) = made
+    assert options["arguments"] == ["-d", str(repository / "config/objreg.rviz")]
+    assert {**options, **alike, "parameters": [{"use_sim_time": True}]} == options
 
 
 def test_an_image_is_remapped_with_its_compressed_form(repository: Path, said: dict[str, Any]) -> None:
@@ -179,8 +179,8 @@ def test_managed_nodes_are_launched_into_the_state_that_was_asked_for(
         )  # fmt: skip
 
     def states() -> list[str]:
-        told = [status for name, status in graph.status.items() if name.startswith(f"/life_{expected}/")]
-        return [pair.value for status in told for pair in status.values if pair.key == "state"]
+        statuses = [status for name, status in graph.status.items() if name.startswith(f"/life_{expected}/")]
+        return [pair.value for status in statuses for pair in status.values if pair.key == "state"]
 
     try:
         graph.wait_for(lambda: states() == [expected] * 3, START_S, f"three nodes that are {expected}")
@@ -210,8 +210,8 @@ def test_without_arguments_the_player_plays_as_it_is(replayed: Callable[..., lis
 
 def test_the_player_publishes_where_the_nodes_listen(replayed: Callable[..., list[str]]) -> None:
     rules = ["__ns:=/robot", "/tf:=tf", "/tf_static:=tf_static", "points:=/kinect/points", "odom:=/wheels"]
-    words = replayed(namespace="robot", points="/kinect/points", odom="/wheels")
-    assert words == ["my_bag", "--", "--ros-args", *(word for rule in rules for word in ("-r", rule))]
+    arguments = replayed(namespace="robot", points="/kinect/points", odom="/wheels")
+    assert arguments == ["my_bag", "--", "--ros-args", *(part for rule in rules for part in ("-r", rule))]
 
 
 def test_the_player_knows_of_the_clock_and_the_depth_that_the_nodes_want(replayed: Callable[..., list[str]]) -> None:
@@ -245,7 +245,7 @@ def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
             env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, stdout=log, stderr=log,
         )  # fmt: skip
     try:
-        names = {f"/robot/{room}" for room in ("detector", "segmenter", "registrar", "mapper")}
+        names = {f"/robot/{name}" for name in ("detector", "segmenter", "registrar", "mapper")}
         graph.wait_for(lambda: names <= set(graph.counters), START_S, f"diagnostics of {names}")
     finally:
         launched.send_signal(signal.SIGINT)
@@ -262,12 +262,12 @@ def test_one_process_is_launched_in_a_namespace_with_the_parameters_of_each_node
     passing.mkdir()
     with (tmp_path / "log").open("w") as log:
         launched = subprocess.Popen(
-            [*command, "namespace:=house", f"model:={tiny_model}", "mapper:=true", "respawn:=true", "log_level:=info"],
+            [*command, "namespace:=second", f"model:={tiny_model}", "mapper:=true", "respawn:=true", "log_level:=info"],
             env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path), "TMPDIR": str(passing)},
             cwd=repository, stdout=log, stderr=log,
         )  # fmt: skip
     try:
-        names = {f"/house/{room}" for room in ("detector", "segmenter", "registrar", "mapper")}
+        names = {f"/second/{name}" for name in ("detector", "segmenter", "registrar", "mapper")}
         graph.wait_for(lambda: names <= set(graph.counters), START_S, f"diagnostics of {names}")
         assert list(passing.glob("objreg_*.yaml"))
     finally:
@@ -339,7 +339,7 @@ def test_a_launch_ends_where_something_is_refused_and_says_what(
 def test_a_node_that_was_killed_is_named_and_the_others_go_on(repository: Path) -> None:
     ended = launch_file(repository)["_ended"]
     context = LaunchContext()
-    for status, words in ((0, []), (-9, ["mapper-4 ended with status -9: the others go on without it"])):
+    for status, lines in ((0, []), (-9, ["mapper-4 ended with status -9: the others go on without it"])):
         event = ProcessExited(returncode=status, action=None, name="mapper-4", cmd=[], cwd=None, env=None, pid=1)
         said = ["".join(part.text for part in action.msg) for action in ended(event, context)]
-        assert [line.partition(";")[0] for line in said] == words
+        assert [line.partition(";")[0] for line in said] == lines

@@ -19,7 +19,7 @@ from objreg_ros.data.localisation import LocalisationState, State
 
 from .graph import START_S, Graph
 from .test_blackbox import about
-from .test_relocalised import BESIDE, HERE, MOUNT, T_ODOM_MAP, ask, frame, remember, tell
+from .test_relocalised import BESIDE, HERE, MOUNT, T_ODOM_MAP, ask, frame, remember, send_frame
 
 pytestmark = pytest.mark.ros
 SEARCH = "-p kidnapping_search:=true"
@@ -62,7 +62,7 @@ def test_a_robot_that_is_carried_elsewhere_is_kidnapped_once_closures_agree(fres
     frames = [frame(*step) for step in steps]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for k, one in enumerate(frames):
-        tell(fresh, one, names)
+        send_frame(fresh, one, names)
         fresh.answer("registrar", one.stamp_ns)
         ask(fresh, Trigger, "registrar/save")
         if k == 1:
@@ -82,7 +82,7 @@ def test_the_topic_says_what_diagnostics_say_with_the_closure_behind_it(fresh: G
     frames = [frame(seconds, T_ODOM_MAP @ T, T) for seconds, T in ((100, BESIDE), (103, HERE), (106, BESIDE))]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for one in frames:
-        tell(fresh, one, names)
+        send_frame(fresh, one, names)
         fresh.answer("registrar", one.stamp_ns)
     ask(fresh, Trigger, "registrar/save")
     said = fresh.received["localisation_state"]

@@ -181,7 +181,7 @@ def test_depth_without_detections_is_dropped_as_unmatched_once_newer_ones_came(r
     assert running.answer("segmenter", stamp_ns + STEP, "clouds/finished") == "published"
 
 
-def test_every_node_is_still_there_and_its_books_balance(running: Graph) -> None:
+def test_every_node_is_still_there_and_its_counters_balance(running: Graph) -> None:
     for name in running.processes:
         assert running.alive(name), running.log(name)
     counters = running.balance("/detector", received=2 * len(IMAGES))

@@ -114,13 +114,13 @@ def test_a_managed_registrar_lets_go_of_its_store_and_opens_it_again(alone: Grap
     assert alone.stop("/registrar") == 0
 
 
-@pytest.mark.parametrize("room", ["segmenter", "mapper"])
-def test_a_managed_node_starts_by_itself_where_it_may_and_a_signal_ends_it(alone: Graph, room: str) -> None:
-    alone.start(f"/{room}", room, "-p managed:=true")
-    assert state(alone, room) == "active"
+@pytest.mark.parametrize("stage", ["segmenter", "mapper"])
+def test_a_managed_node_starts_by_itself_where_it_may_and_a_signal_ends_it(alone: Graph, stage: str) -> None:
+    alone.start(f"/{stage}", stage, "-p managed:=true")
+    assert state(alone, stage) == "active"
     for transition in (DEACTIVATE, CLEAN_UP, CONFIGURE):
-        assert change(alone, room, transition), alone.log(f"/{room}")
-    assert state(alone, room) == "inactive" and alone.stop(f"/{room}") == 0
+        assert change(alone, stage, transition), alone.log(f"/{stage}")
+    assert state(alone, stage) == "inactive" and alone.stop(f"/{stage}") == 0
 
 
 def test_nodes_of_one_process_are_not_managed(alone: Graph) -> None:

@@ -39,24 +39,24 @@ def open_nodes(graph: Graph, tiny_model: Path) -> Iterator[Graph]:
         "registrar": ("-p exchange:=/fleet",),
         "mapper": ("-p robots:=[r1,r2]",) if find_spec("gtsam") else (),
     }
-    rooms = ["detector", "segmenter", "registrar", "keyframer", *(["mapper"] if find_spec("gtsam") else [])]
-    for room in rooms:
-        graph.start(room, "keyframes" if room == "keyframer" else room, *MANAGED, *more.get(room, ()))
+    nodes = ["detector", "segmenter", "registrar", "keyframer", *(["mapper"] if find_spec("gtsam") else [])]
+    for name in nodes:
+        graph.start(name, "keyframes" if name == "keyframer" else name, *MANAGED, *more.get(name, ()))
     graph.wait_for(
-        lambda: {f"{SPACE}/{room}" for room in rooms} <= set(graph.counters), START_S, "the counters of all nodes"
+        lambda: {f"{SPACE}/{name}" for name in nodes} <= set(graph.counters), START_S, "the counters of all nodes"
     )
-    graph.wait_for(lambda: all(is_active(graph, room) for room in rooms), START_S, "active nodes")
+    graph.wait_for(lambda: all(is_active(graph, name) for name in nodes), START_S, "active nodes")
     yield graph
-    for room in rooms:
-        graph.stop(room)
+    for name in nodes:
+        graph.stop(name)
 
 
-def is_active(graph: Graph, room: str) -> bool:
-    values = {pair.key: pair.value for pair in graph.status[f"{SPACE}/{room}"].values}
+def is_active(graph: Graph, name: str) -> bool:
+    values = {pair.key: pair.value for pair in graph.status[f"{SPACE}/{name}"].values}
     return values.get("state") == "active"
 
 
-def opened(graph: Graph, room: str) -> Access:
+def opened(graph: Graph, name: str) -> Access:
     """What a node has opened, by full names."""
     node = graph.node
     asked = (
@@ -65,23 +65,23 @@ def opened(graph: Graph, room: str) -> Access:
         node.get_service_names_and_types_by_node,
         node.get_client_names_and_types_by_node,
     )
-    return Access(*(tuple(name for name, _ in ask(room, SPACE)) for ask in asked))
+    return Access(*(tuple(full_name for full_name, _ in ask(name, SPACE)) for ask in asked))
 
 
-@pytest.mark.parametrize("room", ["detector", "segmenter", "registrar", "keyframer", "mapper"])
-def test_all_that_a_node_opens_is_allowed_and_nothing_is_that_it_never_opens(open_nodes: Graph, room: str) -> None:
-    if room not in open_nodes.processes:
+@pytest.mark.parametrize("name", ["detector", "segmenter", "registrar", "keyframer", "mapper"])
+def test_all_that_a_node_opens_is_allowed_and_nothing_is_that_it_never_opens(open_nodes: Graph, name: str) -> None:
+    if name not in open_nodes.processes:
         pytest.skip("gtsam is not installed: the mapper does not start")
     for kind in ("writes", "reads", "serves", "calls"):
-        may = set(expanded(getattr(ASKED.nodes()[room], kind), SPACE, room))
-        awaited = may - set(expanded(LATER | IN_PLACE.get(room, set()) | absent(), SPACE, room))
+        may = set(expanded(getattr(ASKED.nodes()[name], kind), SPACE, name))
+        awaited = may - set(expanded(LATER | IN_PLACE.get(name, set()) | absent(), SPACE, name))
 
         def missing(kind: str = kind, awaited: set[str] = awaited) -> set[str]:
-            return awaited - set(getattr(opened(open_nodes, room), kind))
+            return awaited - set(getattr(opened(open_nodes, name), kind))
 
         # Discovery brings what an active node has opened a little later.
-        open_nodes.wait_for(lambda missing=missing: not missing(), START_S, f"all that {room} {kind} by its policy")
-        assert set(getattr(opened(open_nodes, room), kind)) <= may, f"{room} {kind} what no policy allows"
+        open_nodes.wait_for(lambda missing=missing: not missing(), START_S, f"all that {name} {kind} by its policy")
+        assert set(getattr(opened(open_nodes, name), kind)) <= may, f"{name} {kind} what no policy allows"
 
 
 def absent() -> set[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A registrar that is started in a known place tells where it is, on a topic and when asked."""
+"""A registrar that is started in a known place states where it is, on a topic and when asked."""
 
 from __future__ import annotations
 
@@ -65,12 +65,12 @@ def remember(store: Path) -> None:
         registrar.finish()
 
 
-def tell(graph: Graph, seen: Frame, names: dict[int, str]) -> None:
+def send_frame(graph: Graph, seen: Frame, names: dict[int, str]) -> None:
     assert seen.T_odom_camera is not None
-    word = Odometry(T_odom_body=seen.T_odom_camera, stamp_ns=seen.stamp_ns, child_frame_id=seen.frame_id)
+    odometry = Odometry(T_odom_body=seen.T_odom_camera, stamp_ns=seen.stamp_ns, child_frame_id=seen.frame_id)
     for topic, message in {
         "labels": to_msg.labels(names),
-        "odom": to_msg.odometry(word),
+        "odom": to_msg.odometry(odometry),
         "objects": to_msg.objects(seen, names),
         "view": to_msg.view(seen),
         "view/camera_info": to_msg.view_camera_info(seen),
@@ -87,7 +87,7 @@ def ask(graph: Graph, kind: type, service: str) -> Any:
     return answer.result()
 
 
-def test_a_registrar_with_the_store_of_an_earlier_session_tells_where_it_woke_up(fresh: Graph, tmp_path: Path) -> None:
+def test_a_registrar_with_the_store_of_an_earlier_session_states_where_it_woke_up(fresh: Graph, tmp_path: Path) -> None:
     store = tmp_path / "place.db"
     remember(store)
     asking = relocalised.Relocalise or Trigger
@@ -102,13 +102,13 @@ def test_a_registrar_with_the_store_of_an_earlier_session_tells_where_it_woke_up
     frames = [frame(seconds, T_ODOM_MAP @ T, T) for seconds, T in later]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for one in (*frames, replace(frames[-1], stamp_ns=frames[-1].stamp_ns + 2_000_000_000)):
-        tell(fresh, one, names)
+        send_frame(fresh, one, names)
         fresh.answer("registrar", one.stamp_ns)
     ask(fresh, Trigger, "registrar/save")
     fresh.wait_for(lambda: bool(fresh.received["relocalised"] and fresh.received["initialpose"]), what="where it is")
-    (told,) = fresh.received["relocalised"]
-    at = told.pose.pose.position
-    assert told.header.frame_id == "map" and np.abs(np.array([at.x, at.y, at.z]) - HERE[:3, 3]).max() < 0.05
+    (published,) = fresh.received["relocalised"]
+    at = published.pose.pose.position
+    assert published.header.frame_id == "map" and np.abs(np.array([at.x, at.y, at.z]) - HERE[:3, 3]).max() < 0.05
     assert fresh.received["initialpose"][0].pose.pose.position.z == 0.0
     answer = ask(fresh, asking, "registrar/relocalise")
     assert answer.success, answer.message

@@ -31,11 +31,11 @@ STAGES = ("detector", "segmenter", "registrar")
 QUIET_S = 1.0  # without another message
 
 
-def objreg(graph: Graph, *words: str, seconds: float = 600) -> str:
+def objreg(graph: Graph, *arguments: str, seconds: float = 600) -> str:
     """The output of the command, while messages come in."""
-    command = [sys.executable, "-m", "objreg_tools.cli", *words]
+    command = [sys.executable, "-m", "objreg_tools.cli", *arguments]
     with subprocess.Popen(command, env=graph.environment(), stdout=subprocess.PIPE, text=True) as process:
-        graph.wait_for(lambda: process.poll() is not None, seconds, " ".join(words))
+        graph.wait_for(lambda: process.poll() is not None, seconds, " ".join(arguments))
         assert process.stdout is not None
         output = process.stdout.read()
     assert process.returncode == 0, output
@@ -62,9 +62,9 @@ def test_a_lossless_replay_brings_every_frame_through_every_node(
     folder = tum_folder(tmp_path / "tum", frames=12)
     output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S), "--patience", "60")
     assert "12 image" in output
-    for room in STAGES:
-        assert f"{room}: 12 published\n" in output
-        counters = fresh.balance(f"/{room}", received=12)
+    for stage in STAGES:
+        assert f"{stage}: 12 published\n" in output
+        counters = fresh.balance(f"/{stage}", received=12)
         assert (counters.published, counters.dropped, counters.lost) == (12, {}, {})
 
 
@@ -92,7 +92,7 @@ def test_depth_with_stamps_of_its_own_goes_through_but_for_the_last(
         assert "1 frames without an acknowledgement, the first of 504000000 ns" in output
 
 
-def test_a_paced_replay_keeps_its_pace_and_tells_the_time(fresh: Graph, tmp_path: Path) -> None:
+def test_a_paced_replay_keeps_its_rate_and_publishes_the_time(fresh: Graph, tmp_path: Path) -> None:
     fresh.receive(Clock, "/clock")
     fresh.receive(Image, "image")
     fresh.receive(Image, "depth/image")
@@ -117,7 +117,7 @@ def test_a_lossless_replay_without_nodes_says_so(fresh: Graph, tmp_path: Path) -
 
 
 @pytest.mark.parametrize(("how", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_replay_that_is_told_to_end_does_so_with_the_usual_status(
+def test_a_replay_that_is_asked_to_end_does_so_with_the_usual_status(
     how: signal.Signals, status: int, fresh: Graph, tmp_path: Path
 ) -> None:
     words = ["replay", str(tum_folder(tmp_path / "tum")), "--loop", "--wait", "0"]
@@ -170,7 +170,7 @@ def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, s
 
 
 @pytest.mark.slow
-def test_objreg_msgs_tell_the_same_as_the_topics_of_common_interfaces_and_more(fresh: Graph, shared: Path) -> None:
+def test_objreg_msgs_state_the_same_as_the_topics_of_common_interfaces_and_more(fresh: Graph, shared: Path) -> None:
     if closures_msg.LoopClosureMsg is None:
         pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
@@ -192,7 +192,7 @@ def test_objreg_msgs_tell_the_same_as_the_topics_of_common_interfaces_and_more(f
         assert (mine.from_frame_id, mine.to_frame_id) == (theirs.from_frame_id, theirs.to_frame_id)
         assert np.array_equal(mine.T_from_to, theirs.T_from_to) and np.array_equal(mine.covariance, theirs.covariance)
         assert mine.evidence["odds"] > 1 and mine.objects and (mine.from_session, mine.to_session) == (0, 0)
-    told = [refusal_of(status) for message in fresh.received["refusals"] for status in message.status]
+    refusals = [refusal_of(status) for message in fresh.received["refusals"] for status in message.status]
     whole = [closures_msg.read_refusal(message) for message in fresh.received["closure_refusals"]]
-    assert [(w.reason, w.to_ns, w.detail) for w in whole] == [(t.reason, t.to_ns, t.detail) for t in told]
+    assert [(w.reason, w.to_ns, w.detail) for w in whole] == [(r.reason, r.to_ns, r.detail) for r in refusals]
     assert fresh.received["object_landmarks"][0].session == "0" and fresh.received["object_landmarks"][0].landmarks

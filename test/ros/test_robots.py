@@ -59,12 +59,12 @@ def fleet(domain: int, tmp_path: Path) -> Iterator[Graph]:
     made.close()
 
 
-def tell(graph: Graph, robot: str, seen: Frame, names: dict[int, str]) -> None:
+def send_frame(graph: Graph, robot: str, seen: Frame, names: dict[int, str]) -> None:
     """What a segmenter in the robot's namespace says of a frame, to who follows it and to registrar or mapper."""
     assert seen.T_odom_camera is not None
-    word = Odometry(T_odom_body=seen.T_odom_camera, stamp_ns=seen.stamp_ns, child_frame_id=seen.frame_id)
+    odometry = Odometry(T_odom_body=seen.T_odom_camera, stamp_ns=seen.stamp_ns, child_frame_id=seen.frame_id)
     graph.publish(f"{robot}/labels", to_msg.labels(names))
-    graph.publish(f"{robot}/odom", to_msg.odometry(replace(word, frame_id=f"{robot}/odom")), listeners=2)
+    graph.publish(f"{robot}/odom", to_msg.odometry(replace(odometry, frame_id=f"{robot}/odom")), listeners=2)
     for topic, message in {
         "objects": to_msg.objects(seen, names),
         "view": to_msg.view(seen),
@@ -81,7 +81,7 @@ def drive(graph: Graph, robot: str, begin_s: int, node: str = "keyframer", sent:
         T = SEEN[robot][k % 2]
         seen = frame(begin_s + 2 * k, T, T)
         names = names | dict(enumerate(sorted({cloud.label for cloud in seen.objects})))
-        tell(graph, robot, seen, names)
+        send_frame(graph, robot, seen, names)
         graph.answer(node, seen.stamp_ns, f"{robot}/finished")
     graph.wait_for(lambda: len(graph.received[f"{robot}/keyframes"]) == sent, what=f"keyframes of {robot}")
 
@@ -169,8 +169,8 @@ def test_two_registrars_that_each_keep_a_store_close_loops_between_their_robots(
     drive(fleet, "r2", 101, "registrar", 0)
 
     def between() -> list[LoopClosure]:
-        told = [from_msg.loop_closure(m) for robot in SEEN for m in fleet.received[f"{robot}/constraints"]]
-        return [one for one in told if one.from_frame_id.split("/")[0] != one.to_frame_id.split("/")[0]]
+        constraints = [from_msg.loop_closure(m) for robot in SEEN for m in fleet.received[f"{robot}/constraints"]]
+        return [one for one in constraints if one.from_frame_id.split("/")[0] != one.to_frame_id.split("/")[0]]
 
     fleet.wait_for(lambda: bool(between()), what="a closure between the robots")
     for closure in between():

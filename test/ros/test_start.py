@@ -14,10 +14,10 @@ from .graph import REPOSITORY, START_S, Graph
 pytestmark = pytest.mark.ros
 
 
-def start(graph: Graph, room: str, *ros_args: str) -> subprocess.CompletedProcess[str]:
+def start(graph: Graph, stage: str, *ros_args: str) -> subprocess.CompletedProcess[str]:
     """Run a node that is expected to end by itself."""
     return subprocess.run(
-        graph.command(room, *ros_args), env=graph.environment(), capture_output=True, text=True, timeout=START_S
+        graph.command(stage, *ros_args), env=graph.environment(), capture_output=True, text=True, timeout=START_S
     )
 
 
@@ -34,26 +34,26 @@ def test_a_wrong_model_file_ends_the_detector_with_one_clear_line(
     assert "wrong.onnx" in line and "expected" in line
 
 
-def test_a_parameter_out_of_range_ends_a_node_in_the_words_of_params(graph: Graph) -> None:
+def test_a_parameter_out_of_range_ends_a_node_with_the_message_of_params(graph: Graph) -> None:
     ended = start(graph, "segmenter", "-p slop:=-1.0")
     assert (ended.returncode, ended.stderr.strip()) == (1, "segmenter: slop: expected at least 0, got -1.0")
 
 
 @pytest.mark.parametrize("namespace", ["/", "/robot"])
 @pytest.mark.parametrize(
-    ("room", "file", "setting", "wrong"),
+    ("stage", "file", "setting", "wrong"),
     [
         ("mapper", "config/objreg.yaml", "keyframe_translation: 0.25", "keyframe_translation: -5.0"),
         ("registrar", "config/covariance.yaml", "covariance_scale: 0.45", "covariance_scale: -5.0"),
     ],
 )
 def test_a_copy_of_our_parameter_files_is_read_in_any_namespace(
-    graph: Graph, tmp_path: Path, room: str, file: str, setting: str, wrong: str, namespace: str
+    graph: Graph, tmp_path: Path, stage: str, file: str, setting: str, wrong: str, namespace: str
 ) -> None:
     text = (REPOSITORY / file).read_text()
     assert setting in text
     (tmp_path / "own.yaml").write_text(text.replace(setting, wrong))
-    ended = start(graph, room, f"--params-file {tmp_path}/own.yaml", f"-r __ns:={namespace}")
+    ended = start(graph, stage, f"--params-file {tmp_path}/own.yaml", f"-r __ns:={namespace}")
     assert ended.returncode == 1 and wrong.split(":")[0] in ended.stderr and "got -5.0" in ended.stderr
 
 
@@ -61,7 +61,7 @@ def test_a_node_says_which_topic_is_missing_and_how_to_remap_it_and_keeps_runnin
     graph: Graph, tiny_model: Path
 ) -> None:
     graph.start("/lonely", "detector", f"-p model:={tiny_model}", "-r __node:=lonely", "-p silence:=0.5")
-    graph.wait_for(lambda: "no publisher" in graph.log("/lonely"), START_S, "a word about the missing image")
+    graph.wait_for(lambda: "no publisher" in graph.log("/lonely"), START_S, "a line about the missing image")
     log = graph.log("/lonely")
     assert "nothing on /image or /image/compressed" in log and "--ros-args -r image:=/your/topic" in log
     assert "shared memory for big messages" in log

@@ -19,7 +19,7 @@ from objreg_ros.geometry import pose_error
 
 from .graph import START_S, Graph
 from .test_peer import call
-from .test_relocalised import BESIDE, HERE, MOUNT, frame, tell
+from .test_relocalised import BESIDE, HERE, MOUNT, frame, send_frame
 
 pytestmark = [
     pytest.mark.ros,
@@ -47,7 +47,7 @@ def drive(graph: Graph, *places: tuple[int, object]) -> None:
     frames = [frame(seconds, T, T) for seconds, T in places]  # type: ignore[arg-type]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for one in frames:
-        tell(graph, one, names)
+        send_frame(graph, one, names)
         graph.answer("registrar", one.stamp_ns)
 
 

@@ -21,7 +21,7 @@ from objreg_ros.geometry import transform
 
 from .graph import Graph
 from .test_peer import call
-from .test_relocalised import BESIDE, HERE, MOUNT, T_ODOM_MAP, ask, frame, remember, tell
+from .test_relocalised import BESIDE, HERE, MOUNT, T_ODOM_MAP, ask, frame, remember, send_frame
 
 pytestmark = [
     pytest.mark.ros,
@@ -62,7 +62,7 @@ def test_a_registrar_says_where_a_thing_is_in_the_odometry_of_now(fresh: Graph, 
     frames = [frame(seconds, T_ODOM_MAP @ T, T) for seconds, T in ((100, BESIDE), (103, HERE), (106, BESIDE))]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
     for one in frames:
-        tell(fresh, one, names)
+        send_frame(fresh, one, names)
         fresh.answer("registrar", one.stamp_ns)
     ask(fresh, Trigger, "registrar/save")
     fresh.wait_for(lambda: bool(fresh.received["relocalised"]), what="the closures, which wait for proof of the camera")
