@@ -18,7 +18,7 @@ class Scene:
     """A camera above a table that looks down by ``tilt_deg``; things are added in table coordinates.
 
     Table coordinates: x right, y forward along the table, z up, the origin on the table ``distance`` metres in front of
-    the camera. ``owner`` tells which thing each pixel shows: 0 nothing, 1 the table, 2 … the things in their order.
+    the camera. ``owner`` states which thing each pixel shows: 0 nothing, 1 the table, 2 … the things in their order.
     """
 
     def __init__(self, camera: Intrinsics = CAMERA, tilt_deg: float = 35.0, distance: float = 1.0) -> None:
@@ -61,7 +61,7 @@ class Scene:
         return DepthImage(depth=depth.astype(np.float32), rgb=rgb, intrinsics=self.camera, stamp_ns=7, frame_id="eye")
 
     def ground(self, image: DepthImage) -> Ground:
-        """What the segmenter knows of a whole image of the scene where it is told the way up."""
+        """What the segmenter knows of a whole image of the scene where up is given."""
         params = SegmenterParams()
         limits, jump = params.limits, params.jump_bounds
         surface = reduce(image.depth, self.camera, cell_size(*image.depth.shape), limits, jump)

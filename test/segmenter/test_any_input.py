@@ -104,7 +104,7 @@ def test_any_boxes_on_any_depth_give_points_of_their_boxes_alone(
 
 @settings(max_examples=60, deadline=None)
 @given(size=SIZES, seed=st.integers(0, 10_000), known=st.booleans(), flat=st.booleans())
-def test_any_cloud_becomes_a_depth_image_or_is_refused_in_words(
+def test_any_cloud_becomes_a_depth_image_or_is_refused_with_a_reason(
     size: tuple[int, int], seed: int, known: bool, flat: bool
 ) -> None:
     rng = np.random.default_rng(seed)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The segmenter behind its node: messages in, a frame and words of warning out."""
+"""The segmenter behind its node: messages in, a frame and warnings out."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class Camera:
     def __init__(self, kept: bool, distortion: tuple[float, ...] = (), model: str = "plumb_bob") -> None:
         self.peer = rclpy.create_node("camera")
         self.info = self.peer.create_publisher(CameraInfo, "camera_info", qos.latched() if kept else qos.stage())
-        told = to_msg.camera_info(CAMERA, 1, "eye")
+        info = to_msg.camera_info(CAMERA, 1, "eye")
         if distortion:
-            told.d, told.distortion_model = list(distortion), model
-        self.info.publish(told)
+            info.d, info.distortion_model = list(distortion), model
+        self.info.publish(info)
         self.depth = self.peer.create_publisher(Image, "depth/image", qos.stage())
         self.table = self.peer.create_publisher(PointCloud2, "detections_table", qos.stage())
         self.labels = self.peer.create_publisher(String, "labels", qos.latched())
@@ -54,7 +54,7 @@ class Camera:
     def wait(self, done: Callable[[], Any], seconds: float = 300.0) -> None:
         end = time.monotonic() + seconds
         while not done():
-            assert time.monotonic() < end, f"nothing came; the books say {self.node.accounting.balance()}"
+            assert time.monotonic() < end, f"nothing came; the counters are {self.node.accounting.balance()}"
             self.executor.spin_once(timeout_sec=0.05)
 
     def see(self, metres: float, frame_id: str, picture_frame_id: str) -> None:
@@ -65,10 +65,10 @@ class Camera:
             xyxy=np.array([[100, 70, 220, 170]], np.float32), score=np.ones(1, np.float32), label=("cup",),
             image_hw=depth.shape, stamp_ns=stamp_ns, frame_id=picture_frame_id,
         )  # fmt: skip
-        word = DepthImage(depth=depth, rgb=None, intrinsics=CAMERA, stamp_ns=stamp_ns, frame_id=frame_id)
+        image = DepthImage(depth=depth, rgb=None, intrinsics=CAMERA, stamp_ns=stamp_ns, frame_id=frame_id)
         message = Image(
             header=to_msg.header(stamp_ns, frame_id), height=CAMERA.height, width=CAMERA.width, encoding="32FC1",
-            step=4 * CAMERA.width, data=word.depth.tobytes(),
+            step=4 * CAMERA.width, data=image.depth.tobytes(),
         )  # fmt: skip
         self.table.publish(to_msg.detections_table(seen, NAMES))
         self.depth.publish(message)
@@ -103,7 +103,7 @@ def test_a_camera_info_that_was_published_once_and_kept_serves_a_segmenter_that_
     assert camera.said == [] and not camera.node.watch.silent()
 
 
-def test_a_camera_that_keeps_nothing_is_heard_without_a_word_of_qos(
+def test_a_camera_that_keeps_nothing_is_received_without_a_warning_of_qos(
     made: Callable[..., Camera], capfd: pytest.CaptureFixture[str]
 ) -> None:
     camera = made(kept=False)
@@ -115,7 +115,7 @@ def test_a_camera_that_keeps_nothing_is_heard_without_a_word_of_qos(
     assert "QoS" not in capfd.readouterr().err and camera.said == []
 
 
-def test_depth_of_another_frame_than_the_picture_is_told_with_what_to_do(made: Callable[..., Camera]) -> None:
+def test_depth_of_another_frame_than_the_picture_is_reported_with_what_to_do(made: Callable[..., Camera]) -> None:
     camera = made()
     camera.see(1.2, "depth_eye", "colour_eye")
     (line,) = camera.said
@@ -143,14 +143,14 @@ def test_depth_of_another_sensor_is_brought_into_the_picture_of_colour(
 
 
 @pytest.mark.parametrize("made", [("-p", "level_odom:=true")], indirect=True)
-def test_frames_without_a_level_odometry_that_is_asked_for_are_told(made: Callable[..., Camera]) -> None:
+def test_frames_without_a_level_odometry_that_is_asked_for_are_reported(made: Callable[..., Camera]) -> None:
     camera = made()
     camera.see(1.2, "eye", "eye")
     (line,) = camera.said
     assert "as level_odom is on, got none: gravity is estimated" in line
 
 
-def test_millimetres_as_floats_are_told_with_what_to_do(made: Callable[..., Camera]) -> None:
+def test_millimetres_as_floats_are_reported_with_what_to_do(made: Callable[..., Camera]) -> None:
     camera = made()
     camera.see(1200.0, "eye", "eye")
     (line,) = camera.said
@@ -201,7 +201,7 @@ def test_pictures_that_are_said_to_be_rectified_are_segmented_as_they_come(
     assert "taken as rectified" in camera.node._lens
 
 
-def test_the_name_of_a_topic_behind_its_remap_tells_what_is_rectified(
+def test_the_name_of_a_topic_behind_its_remap_states_what_is_rectified(
     made: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera = made(distortion=(-0.3, 0.1, 0.0, 0.0, 0.0))
@@ -224,7 +224,7 @@ def test_a_frame_of_a_lens_that_nobody_knows_is_dropped_and_counted(made: Callab
 
 
 @pytest.mark.parametrize("made", [("-p", 'camera:="600,600,320,240,640,480"')], indirect=True)  # of twice the size
-def test_the_camera_of_the_parameter_holds_and_no_camera_info_is_heard(
+def test_the_camera_of_the_parameter_holds_and_no_camera_info_is_received(
     monkeypatch: pytest.MonkeyPatch, made: Callable[..., Camera]
 ) -> None:
     camera = made()
@@ -232,8 +232,14 @@ def test_the_camera_of_the_parameter_holds_and_no_camera_info_is_heard(
     camera.see(1.2, "eye", "eye")
     ((_, depth),) = met
     assert camera.said == []
-    told = depth.intrinsics
-    assert (told.fx, told.fy, told.cx, told.cy, told.width) == (300, 300, 159.75, 119.75, 320)
+    intrinsics = depth.intrinsics
+    assert (intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy, intrinsics.width) == (
+        300,
+        300,
+        159.75,
+        119.75,
+        320,
+    )
     assert "/camera_info" not in camera.node.connected and not camera.node.watch.silent()
 
 

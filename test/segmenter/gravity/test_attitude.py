@@ -37,20 +37,20 @@ def off_deg(filter_: AttitudeFilter, truth: np.ndarray) -> float:
 
 
 def run(filter_: AttitudeFilter, first: int, count: int, make: Callable[[int], ImuSample]) -> list[FeltGravity]:
-    return [word for k in range(first, first + count) if (word := filter_.add_imu(make(k))) is not None]
+    return [output for k in range(first, first + count) if (output := filter_.add_imu(make(k))) is not None]
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, -75.0, 180.0])
 @pytest.mark.parametrize(("turn", "most_deg"), [(SMALL_TURN, 0.1), (BIASED_TURN, 0.5)])
-def test_an_imu_at_rest_tells_its_tilt_and_becomes_surer(
+def test_an_imu_at_rest_gives_its_tilt_and_becomes_surer(
     degrees: float, turn: tuple[float, float, float], most_deg: float
 ) -> None:
     rng = np.random.default_rng(0)
     filter_ = AttitudeFilter()
     noisy = [-G * tilted(degrees) + rng.normal(0.0, 0.05, 3) for _ in range(10 * HZ)]
-    words = run(filter_, 0, 10 * HZ, lambda k: sample(k, noisy[k], turn))
+    outputs = run(filter_, 0, 10 * HZ, lambda k: sample(k, noisy[k], turn))
     assert off_deg(filter_, tilted(degrees)) < most_deg
-    assert words[0].gravity_sigma_deg > 3.0 and BIAS_DEG < words[-1].gravity_sigma_deg < 1.5
+    assert outputs[0].gravity_sigma_deg > 3.0 and BIAS_DEG < outputs[-1].gravity_sigma_deg < 1.5
 
 
 def test_a_direction_that_was_wrong_at_the_start_turns_right_while_the_gyroscope_carries_it() -> None:
@@ -137,7 +137,7 @@ def orientation_of(falls: np.ndarray, yaw: float = 0.7) -> np.ndarray:
     return quaternion_from_rotation(rotation_from_vector(np.array([0.0, 0.0, yaw])) @ R_world_imu)
 
 
-def test_an_orientation_tells_roll_and_pitch_whatever_its_yaw() -> None:
+def test_an_orientation_gives_roll_and_pitch_whatever_its_yaw() -> None:
     falls = tilted(25.0)
     for yaw in (0.0, 1.0, -2.5):
         filter_ = AttitudeFilter()
@@ -157,13 +157,13 @@ def test_an_orientation_whose_world_is_upside_down_gives_way_to_the_acceleromete
     ("acceleration", "reason"),
     [(None, "no_acceleration"), ((0, 0, 0), "no_acceleration"), ((0, 0, 1.0), "norm"), ((1e300, 1e300, 0), "norm")],
 )
-def test_an_accelerometer_that_tells_no_direction_is_counted(acceleration: object, reason: str) -> None:
+def test_an_accelerometer_that_gives_no_direction_is_counted(acceleration: object, reason: str) -> None:
     filter_ = AttitudeFilter()
     assert run(filter_, 0, 5, lambda k: sample(k, acceleration, SMALL_TURN)) == []
     assert filter_.counts == {reason: 5} and filter_.sigma_deg == 90.0
 
 
-def test_a_gyroscope_that_tells_the_impossible_is_not_believed() -> None:
+def test_a_gyroscope_that_gives_the_impossible_is_not_believed() -> None:
     filter_ = AttitudeFilter()
     run(filter_, 0, HZ, lambda k: sample(k, -G * DOWN, (1e8, 0.0, 1e300)))
     assert off_deg(filter_, DOWN) < 1e-6 and filter_.counts == {"turn": HZ}
@@ -174,25 +174,25 @@ def test_stamps_that_come_late_are_passed_over_and_a_clock_that_jumps_begins_ane
     run(filter_, 0, HZ, lambda k: sample(k, -G * DOWN, SMALL_TURN))
     assert filter_.add_imu(sample(HZ - 3, G * DOWN, SMALL_TURN)) is None and off_deg(filter_, DOWN) < 1e-3
     assert filter_.add_imu(sample(HZ - 1, G * DOWN, SMALL_TURN)) is None
-    word = filter_.add_imu(sample(-10 * HZ, -G * tilted(20.0), SMALL_TURN))
-    assert word is not None and word.gravity == pytest.approx(tilted(20.0)) and word.gravity_sigma_deg > 3.0
-    word = filter_.add_imu(sample(3600 * HZ, -G * tilted(40.0), SMALL_TURN))
-    assert word is not None and word.gravity == pytest.approx(tilted(40.0))
+    output = filter_.add_imu(sample(-10 * HZ, -G * tilted(20.0), SMALL_TURN))
+    assert output is not None and output.gravity == pytest.approx(tilted(20.0)) and output.gravity_sigma_deg > 3.0
+    output = filter_.add_imu(sample(3600 * HZ, -G * tilted(40.0), SMALL_TURN))
+    assert output is not None and output.gravity == pytest.approx(tilted(40.0))
     assert filter_.counts == {"late": 2, "time_jump": 1, "gap": 1}
 
 
 def test_another_imu_on_the_topic_begins_anew() -> None:
     filter_ = AttitudeFilter()
     run(filter_, 0, HZ, lambda k: sample(k, -G * DOWN, SMALL_TURN, frame_id="a"))
-    word = filter_.add_imu(sample(HZ, -G * tilted(90.0), SMALL_TURN, frame_id="b"))
-    assert word is not None and word.gravity == pytest.approx(tilted(90.0)) and word.frame_id == "b"
+    output = filter_.add_imu(sample(HZ, -G * tilted(90.0), SMALL_TURN, frame_id="b"))
+    assert output is not None and output.gravity == pytest.approx(tilted(90.0)) and output.frame_id == "b"
 
 
-def test_a_flood_gives_no_more_words_than_are_wanted() -> None:
+def test_a_flood_gives_no_more_outputs_than_are_wanted() -> None:
     filter_ = AttitudeFilter()
     make = lambda k: sample(0, -G * DOWN, SMALL_TURN, stamp_ns=10**9 + k * 10_000)  # noqa: E731  100 kHz
-    words = run(filter_, 0, 10_000, make)  # a tenth of a second
-    assert len(words) == 1 + 99_990_000 // WORD_NS
+    outputs = run(filter_, 0, 10_000, make)  # a tenth of a second
+    assert len(outputs) == 1 + 99_990_000 // WORD_NS
     assert {len(value) for value in vars(filter_).values() if isinstance(value, list)} == set()
 
 
@@ -203,6 +203,6 @@ def test_any_sequence_of_finite_samples_keeps_a_direction_of_length_1() -> None:
         scale = 10.0 ** rng.uniform(-12, 12)
         turn = rng.normal(0, 1, 3) * 10.0 ** rng.uniform(-12, 3) if rng.random() < 0.9 else None
         acceleration = rng.normal(0, 1, 3) * (scale if rng.random() < 0.5 else 7.0)
-        word = filter_.add_imu(sample(0, acceleration, turn, stamp_ns=int(rng.integers(0, 4 * 10**9))))
-        if word is not None:
-            assert np.linalg.norm(word.gravity) == pytest.approx(1.0) and 0.0 < word.gravity_sigma_deg <= 90.0
+        output = filter_.add_imu(sample(0, acceleration, turn, stamp_ns=int(rng.integers(0, 4 * 10**9))))
+        if output is not None:
+            assert np.linalg.norm(output.gravity) == pytest.approx(1.0) and 0.0 < output.gravity_sigma_deg <= 90.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The surer one tells gravity."""
+"""The surer one gives gravity."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def test_a_picture_that_contradicts_the_imu_loses_however_sure_it_is() -> None:
     assert choice.source == "imu" and choice.disagreement_deg == pytest.approx(60.0)
 
 
-def test_alone_an_imu_tells_gravity_unless_it_knows_next_to_nothing() -> None:
+def test_alone_an_imu_gives_gravity_unless_it_knows_next_to_nothing() -> None:
     assert choose_gravity(UP, 0.8, None, 0.0)[2:] == ("imu", None)
     assert choose_gravity(UP, 80.0, None, 0.0) == (None, 0.0, "nothing", None)
     assert choose_gravity(UP, 80.0, tilted(1.0), 0.2).source == "picture"
 
 
-def test_a_deviation_and_its_confidence_are_told_back_and_forth() -> None:
+def test_a_deviation_and_its_confidence_are_converted_back_and_forth() -> None:
     assert gravity_confidence(0.5) == gravity_confidence(0.01) == 1.0
     assert gravity_confidence(np.inf) == gravity_confidence(np.nan) == 0.0 and gravity_sigma_deg(0.0) == 90.0
     sure = np.linspace(0.3, 1.0, 50)

@@ -18,26 +18,26 @@ def felt(frame_id: str = "imu_link") -> FeltGravity:
 
 
 def test_the_mounting_turns_gravity_into_the_camera() -> None:
-    word = Imu(BODY_IN_OPTICAL).in_camera(felt(), "eye")
-    assert word is not None and word.gravity == pytest.approx([0.0, 1.0, 0.0])
-    assert (word.frame_id, word.stamp_ns, word.gravity_sigma_deg) == ("eye", 5, 0.8)
+    turned = Imu(BODY_IN_OPTICAL).in_camera(felt(), "eye")
+    assert turned is not None and turned.gravity == pytest.approx([0.0, 1.0, 0.0])
+    assert (turned.frame_id, turned.stamp_ns, turned.gravity_sigma_deg) == ("eye", 5, 0.8)
     tilted = BODY_IN_OPTICAL @ pose(rotation_from_vector(np.array([0.0, np.radians(10.0), 0.0])), np.zeros(3))
-    word = Imu(tilted).in_camera(felt(), "eye")
-    assert word is not None and word.gravity @ np.array([0.0, 1.0, 0.0]) == pytest.approx(np.cos(np.radians(10.0)))
+    turned = Imu(tilted).in_camera(felt(), "eye")
+    assert turned is not None and turned.gravity @ np.array([0.0, 1.0, 0.0]) == pytest.approx(np.cos(np.radians(10.0)))
 
 
 def test_frames_that_are_known_to_be_tied_need_no_parameter() -> None:
     known = {("eye", "imu_link"): BODY_IN_OPTICAL}
-    word = Imu(None, lambda camera, imu: known.get((camera, imu))).in_camera(felt("/imu_link"), "/eye")
-    assert word is not None and word.gravity == pytest.approx([0.0, 1.0, 0.0])
+    turned = Imu(None, lambda camera, imu: known.get((camera, imu))).in_camera(felt("/imu_link"), "/eye")
+    assert turned is not None and turned.gravity == pytest.approx([0.0, 1.0, 0.0])
 
 
 @pytest.mark.parametrize(("imu", "camera"), [("eye", "eye"), ("/eye", "eye"), ("", "eye"), ("imu_link", "")])
 def test_an_imu_of_the_cameras_own_frame_or_of_none_needs_no_mounting(imu: str, camera: str) -> None:
-    word = Imu().in_camera(felt(imu), camera)
-    assert word is not None and word.gravity == pytest.approx([0.0, 0.0, -1.0])
+    turned = Imu().in_camera(felt(imu), camera)
+    assert turned is not None and turned.gravity == pytest.approx([0.0, 0.0, -1.0])
 
 
-def test_an_imu_that_is_mounted_nobody_knows_how_tells_nothing_and_is_counted() -> None:
+def test_an_imu_that_is_mounted_nobody_knows_how_gives_nothing_and_is_counted() -> None:
     imu = Imu()
     assert imu.in_camera(felt(), "eye") is None and imu.counts == {"unknown_frame": 1}

@@ -21,7 +21,7 @@ def test_the_floor_wins_over_a_larger_wall() -> None:
     assert confidence > 0.9
 
 
-def test_walls_alone_tell_nothing() -> None:
+def test_walls_alone_give_nothing() -> None:
     assert estimate_up(around(np.array([0.2, 0.05, -1.0]), 2000), camera_up(0.0), 65.0) == (None, 0.0)
 
 
@@ -56,7 +56,7 @@ def test_unknown_normals_are_left_out() -> None:
     assert known_normals(normals, 1).shape == (21, 3)
 
 
-def test_a_ring_of_normals_with_none_in_its_middle_tells_its_middle() -> None:
+def test_a_ring_of_normals_with_none_in_its_middle_gives_its_middle() -> None:
     angle, tilt = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False), np.radians(7.0)
     ring = np.stack([np.sin(tilt) * np.cos(angle), np.full(400, -np.cos(tilt)), np.sin(tilt) * np.sin(angle)], axis=1)
     up, _ = estimate_up(ring.astype(np.float32), camera_up(0.0), 65.0)

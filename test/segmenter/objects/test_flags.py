@@ -116,7 +116,7 @@ def test_a_flat_thing_whose_plane_ends_at_its_box_is_no_wall() -> None:
     assert flags_of(screen, screen.owner == 2, (x0, y0, x1, y1)) == PointFlag(0)
 
 
-def test_a_patch_of_wall_is_closed_by_its_own_plane_whatever_else_is_seen() -> None:
+def test_a_patch_of_wall_is_recognised_by_its_own_plane_whatever_else_is_seen() -> None:
     scene = wall().plane(z=-0.4)
     share = (scene.owner == 1).mean()
     assert 0.5 < share < 0.8  # the rest is floor

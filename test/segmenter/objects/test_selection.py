@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a box holds: told apart, and put together."""
+"""What a box holds: taken apart, and put together."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_two_parts_of_one_colour_and_distance_that_fill_a_box_are_one_thing() ->
     assert min(found[4], found[5]) > 0.9
 
 
-def test_stacked_boxes_are_told_apart() -> None:
+def test_stacked_boxes_are_taken_apart() -> None:
     scene = Scene(tilt_deg=45).plane().box((-0.15, -0.1, 0), (0.15, 0.15, 0.08))
     scene = scene.box((-0.08, -0.02, 0.08), (0.08, 0.12, 0.16))
     lower = shares(scene, scene.box_of(2, pad=0.02))

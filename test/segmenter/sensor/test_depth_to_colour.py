@@ -83,7 +83,7 @@ def test_what_no_depth_pixel_saw_is_none() -> None:
     assert not back[:, -gone + 4 :].any() or not back[:, : gone - 4].any()
 
 
-def test_a_picture_without_depth_steps_tells_nothing_and_is_turned_as_those_before() -> None:
+def test_a_picture_without_depth_steps_gives_nothing_and_is_turned_as_those_before() -> None:
     stream = DepthToColour()
     for k in range(20):
         stream.register(image(LAG, 0.01 * k), KINECT)
@@ -125,7 +125,7 @@ def test_another_camera_begins_anew() -> None:
     assert stream.offset(other).rotation == pytest.approx(np.zeros(3), abs=0.002) and stream.frames == 1
 
 
-def test_depth_steps_without_edges_of_colour_tell_nothing() -> None:
+def test_depth_steps_without_edges_of_colour_give_nothing() -> None:
     painted = image(LAG)
     rng = np.random.default_rng(0)
     noise = np.kron(rng.integers(0, 256, (60, 80)), np.ones((8, 8))).astype(np.uint8)

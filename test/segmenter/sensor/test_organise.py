@@ -147,7 +147,7 @@ def test_a_camera_that_does_not_see_the_points_in_their_pixels_gives_way_to_the_
     assert (got.fx, got.fy, got.cx, got.cy) == pytest.approx((300.0, 310.0, 30.2, 22.9), abs=1e-2)
 
 
-def test_a_cloud_of_too_few_points_to_tell_keeps_its_camera() -> None:
+def test_a_cloud_of_too_few_points_to_measure_keeps_its_camera() -> None:
     xyz = np.full((48, 64, 3), np.nan, np.float32)
     xyz[:2, :8] = (0.0, 0.0, 1.0)
     assert organise(PointCloud(xyz=xyz, rgb=None, stamp_ns=0), CAMERA).intrinsics == CAMERA

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A stream tells how noisy its depth is and how late: a camera that turns to and fro before boards on a wall."""
+"""How noisy the depth of a stream is and how late: a camera that turns to and fro before boards on a wall."""
 
 from __future__ import annotations
 
@@ -79,19 +79,19 @@ def estimate_of(images: list[DepthImage]) -> SensorEstimate:
 
 
 @pytest.mark.parametrize(("lag_ms", "speed"), [(25.0, 1.0), (25.0, 0.4), (-20.0, 1.0), (0.0, 1.0)])
-def test_the_lag_of_depth_is_told_within_ten_milliseconds(lag_ms: float, speed: float) -> None:
+def test_the_lag_of_depth_is_measured_within_ten_milliseconds(lag_ms: float, speed: float) -> None:
     lag = estimate_of(stream(lag_ms, speed=speed)).lag
     assert lag is not None and lag.sigma_ms <= MOST_SIGMA_MS
     assert lag.ms == pytest.approx(lag_ms, abs=10.0)
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.1])
-def test_a_camera_that_hardly_turns_tells_no_lag(speed: float) -> None:
+def test_a_camera_that_hardly_turns_gives_no_lag(speed: float) -> None:
     estimate = estimate_of(stream(25.0, speed=speed))
     assert estimate.lag is None
 
 
-def test_too_few_frames_tell_no_lag() -> None:
+def test_too_few_frames_give_no_lag() -> None:
     assert estimate_of(stream(25.0, count=20)).lag is None
 
 
@@ -138,12 +138,12 @@ def test_a_picture_moves_against_the_turn_of_its_camera() -> None:
         assert velocity == pytest.approx(true[:2], abs=0.04)
 
 
-def test_no_velocity_is_told_across_a_gap_or_as_time_goes_back() -> None:
+def test_no_velocity_is_given_across_a_gap_or_as_time_goes_back() -> None:
     images = stream(0.0, count=4)
     for stamp_ns in (10_000_000_000, 0):
         motion = PictureMotion()
-        told = [velocity_after(motion, image) for image in (*images[:3], replace(images[3], stamp_ns=stamp_ns))]
-        assert told[2] is not None and told[3] is None
+        velocities = [velocity_after(motion, image) for image in (*images[:3], replace(images[3], stamp_ns=stamp_ns))]
+        assert velocities[2] is not None and velocities[3] is None
 
 
 def test_a_picture_of_one_row_ends_nothing() -> None:
@@ -155,7 +155,7 @@ def test_a_picture_of_one_row_ends_nothing() -> None:
         assert velocity_after(motion, image) is None
 
 
-def test_the_noise_of_depth_is_told_in_a_kinects() -> None:
+def test_the_noise_of_depth_is_given_in_a_kinects() -> None:
     plain = replace(stream(0.0, count=1, speed=0.0)[0], rgb=None)
     flat = np.full(plain.depth.shape, 2.0)
     rng = np.random.default_rng(2)
@@ -168,7 +168,7 @@ def test_the_noise_of_depth_is_told_in_a_kinects() -> None:
     assert estimate.lag is None and not estimate.depth_to_colour.text()
 
 
-def test_frames_without_depth_tell_no_noise() -> None:
+def test_frames_without_depth_give_no_noise() -> None:
     empty = replace(stream(0.0, count=1)[0], depth=np.zeros((240, 320), np.float32), rgb=None)
     assert estimate_of([empty]).noise is None
 
@@ -180,7 +180,7 @@ def test_another_camera_begins_anew() -> None:
     assert estimate.lag is None and estimate.noise is None
 
 
-def test_what_is_forgotten_is_not_told() -> None:
+def test_what_is_forgotten_is_not_reported() -> None:
     estimate = estimate_of(stream(25.0))
     assert estimate.noise is not None and estimate.lag is not None and estimate.depth_to_colour.text()
     estimate.forget_stream()

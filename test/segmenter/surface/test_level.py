@@ -52,7 +52,7 @@ def test_the_table_around_a_box_is_level_and_the_box_is_not() -> None:
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.02])
-def test_a_thin_book_is_told_from_its_table_even_where_depth_is_bent(bend: float) -> None:
+def test_a_thin_book_is_distinguished_from_its_table_even_where_depth_is_bent(bend: float) -> None:
     scene = Scene(tilt_deg=60).plane().box((0.25, 0.1, 0), (0.45, 0.3, 0.008))
     _, table, book = level_shares(scene, 2, bend)
     assert table > 0.9
