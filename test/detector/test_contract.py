@@ -13,7 +13,7 @@ def graph(**probe: np.ndarray) -> Graph:
     return Graph((), (), {}, probe, 2, "auto", (64, 64))
 
 
-def test_a_head_is_the_first_output_of_three_dimensions_and_prototypes_tell_of_masks() -> None:
+def test_a_head_is_the_first_output_of_three_dimensions_and_prototypes_mean_masks() -> None:
     one = graph(flat=np.zeros((1, 5)), head=np.zeros((1, 5, 6)))
     assert one.head == "head" and one.masks == 0
     assert graph(head=np.zeros((1, 38, 84)), proto=np.zeros((1, 32, 16, 16))).masks == 32

@@ -18,7 +18,7 @@ LABELS = {"objreg.labels": '["cup", "pot", "book"]'}
 IMAGE = ColourImage(rgb=np.zeros((240, 480, 3), np.uint8), stamp_ns=0)
 
 
-def test_told_boxes_are_of_the_size_that_the_second_input_says(tmp_path: Path) -> None:
+def test_boxes_are_of_the_size_that_the_second_input_says(tmp_path: Path) -> None:
     outputs = {"labels": np.array([[1, 0]]), "boxes": np.array([[[0.25, 0.5, 0.5, 1.0], [0, 0, 1, 1]]]),
                "scores": np.array([[0.9, 0.2]])}  # fmt: skip
     path = save_constant_model(tmp_path / "m.onnx", outputs, (1, 3, 64, 96), "images", 1, LABELS, sizes=True)

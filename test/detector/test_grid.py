@@ -31,7 +31,7 @@ def test_cells_run_along_rows_the_finest_grid_first() -> None:
     assert cell[13].tolist() == [1, 1, 8] and cell[96].tolist() == [0, 0, 16] and cell[-1].tolist() == [2, 1, 32]
 
 
-def test_a_box_of_yolox_is_told_from_its_cell_and_its_picture_is_at_the_corner(tmp_path: Path) -> None:
+def test_a_box_of_yolox_is_counted_from_its_cell_and_its_picture_is_at_the_corner(tmp_path: Path) -> None:
     head = np.zeros((1, 126, 8), np.float32)
     head[0, 96 + 7] = [0.5, 0.25, np.log(2), np.log(1.5), 0.9, 0.1, 0.2, 1.0]  # the second of the second row of 16 px
     seen = Detector(DetectorParams(), save(tmp_path, head)).detect(IMAGE)  # 480 x 240 is 96 x 48 there

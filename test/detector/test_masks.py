@@ -50,7 +50,7 @@ def test_discs_come_back_at_their_pixels_through_the_letterbox(kind: str, hw: tu
     require_discs(hw, found.instances)
 
 
-def test_a_head_that_has_chosen_already_tells_masks_too(tmp_path: Path) -> None:
+def test_a_head_that_has_chosen_already_gives_masks_too(tmp_path: Path) -> None:
     found = seen(tmp_path, chosen((240, 320)), (240, 320), contract="end_to_end")
     assert found.label == ("cup", "book")
     require_discs((240, 320), found.instances)
@@ -87,13 +87,13 @@ def test_only_what_survives_the_suppression_of_overlaps_is_drawn(
     assert len(seen(tmp_path, head, hw)) == 2 and len(drawn) == 2
 
 
-def test_a_model_without_prototypes_tells_no_masks(tmp_path: Path) -> None:
+def test_a_model_without_prototypes_gives_no_masks(tmp_path: Path) -> None:
     model = save_constant_model(tmp_path / "m.onnx", {"output0": heads((240, 320), "yolov8")[:, :7]},
                                 (1, 3, *MODEL_HW), "images", 1, NAMES | {"task": "detect"})  # fmt: skip
     found = Detector(DetectorParams(), model).detect(ColourImage(rgb=np.zeros((240, 320, 3), np.uint8), stamp_ns=7))
     assert found.label == ("cup", "book") and found.instances is None
 
 
-def test_candidates_are_boxes_unless_told_otherwise() -> None:
+def test_candidates_are_boxes_unless_stated_otherwise() -> None:
     none = Candidates(np.zeros((0, 4)), np.zeros(0), np.zeros(0, np.int64))
     assert none.coefficients is None and none.prototypes is None

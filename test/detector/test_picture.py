@@ -107,7 +107,7 @@ def test_half_floats_are_given_to_a_model_that_asks_for_them() -> None:
     assert picture.tensor(np.zeros((30, 40, 3), np.uint8)).dtype == np.float16
 
 
-def test_the_second_input_tells_width_and_height_of_the_models_picture() -> None:
+def test_the_second_input_states_width_and_height_of_the_models_picture() -> None:
     picture = Picture.of((Port("x", "float", (1, 3, 30, 40)), Port("orig_target_sizes", "int64", (1, 2))), {})
     tensor = picture.tensor(np.zeros((50, 70, 3), np.uint8))
     assert {name: value.tolist() for name, value in picture.extra(tensor).items()} == {"orig_target_sizes": [[40, 30]]}

@@ -40,11 +40,11 @@ def of(
         ((1, 5, 8400), 1, "YoloV8"),
     ],
 )
-def test_the_number_of_labels_and_of_cells_tell_the_contract(shape: tuple[int, ...], labels: int, kind: str) -> None:
+def test_the_number_of_labels_and_of_cells_give_the_contract(shape: tuple[int, ...], labels: int, kind: str) -> None:
     assert type(of(shape, labels)).__name__ == kind
 
 
-def test_what_fits_two_contracts_is_refused_unless_metadata_or_a_name_tell() -> None:
+def test_what_fits_two_contracts_is_refused_unless_metadata_or_a_name_decide() -> None:
     with pytest.raises(ValueError, match=r"expected one contract that fits 2 labels, got output0 \[1, 300, 6\], which "
                                          r"may be end_to_end or detr; name it with `contract`"):  # fmt: skip
         of((1, 300, 6), 2)
@@ -61,7 +61,7 @@ def test_other_labels_than_the_models_are_refused_with_expected_and_got(named: s
         of((1, 84, 8400), 7, named=named)
 
 
-def test_a_name_is_kept_where_another_contract_would_be_told() -> None:
+def test_a_name_is_kept_where_another_contract_would_be_recognised() -> None:
     assert type(of((1, 8400, 85), named="yolov5")).__name__ == "YoloV5"
     with pytest.raises(ValueError, match=r"expected boxes \[1,N,4\]"):
         of((1, 84, 8400), named="tf_detection")

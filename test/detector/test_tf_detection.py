@@ -60,7 +60,7 @@ CALLED = tuple(f"StatefulPartitionedCall:{k}" for k in range(4))
     "order", ["boxes classes scores count", "scores boxes count classes", "count scores classes boxes"]
 )
 @pytest.mark.parametrize("scores", [[0.9, 0.3], [1.0, 0.3]])
-def test_outputs_whose_names_say_nothing_are_told_apart_by_their_values(order: str, scores: list[float]) -> None:
+def test_outputs_whose_names_say_nothing_are_distinguished_by_their_values(order: str, scores: list[float]) -> None:
     values = dict(
         zip(("boxes", "classes", "scores", "count"), tf_outputs([BOX, BOX], [1, 0], scores).values(), strict=True)
     )
@@ -71,7 +71,7 @@ def test_outputs_whose_names_say_nothing_are_told_apart_by_their_values(order: s
 
 
 @pytest.mark.parametrize(("classes", "scores"), [([1, 0], [1, 1]), ([0, 0], [0, 0]), ([2.5, 1.0], [0.5, 3.0])])
-def test_outputs_that_neither_names_nor_values_tell_apart_are_refused(
+def test_outputs_that_neither_names_nor_values_distinguish_are_refused(
     classes: list[float], scores: list[float]
 ) -> None:
     outputs = tf_outputs([BOX, BOX], classes, scores, names=CALLED)
@@ -83,7 +83,7 @@ def test_outputs_that_neither_names_nor_values_tell_apart_are_refused(
 
 @pytest.mark.parametrize("names", [("boxes", "labels", "scores"), ("b", "detected_Class", "s"), ("b", "c", "Score")])
 @pytest.mark.parametrize("swapped", [False, True])
-def test_names_tell_even_where_the_values_do_not(names: tuple[str, ...], swapped: bool) -> None:
+def test_names_decide_even_where_the_values_do_not(names: tuple[str, ...], swapped: bool) -> None:
     outputs = tf_outputs([BOX, BOX], [1, 0], [1, 0], names=names)
     if swapped:
         outputs = dict(reversed(outputs.items()))

@@ -39,9 +39,9 @@ def save_constant_model(
     constants = [onnx.numpy_helper.from_array(np.float32(0).reshape(()), "zero")]
     for name, value in outputs.items():
         constants.append(onnx.numpy_helper.from_array(np.asarray(value, np.float32), f"{name}/constant"))
-        told = sizes and name == "boxes"
-        nodes.append(onnx.helper.make_node("Add", [f"{name}/constant", "nothing"], ["shares" if told else name]))
-        if told:
+        is_scaled = sizes and name == "boxes"
+        nodes.append(onnx.helper.make_node("Add", [f"{name}/constant", "nothing"], ["shares" if is_scaled else name]))
+        if is_scaled:
             nodes.append(onnx.helper.make_node("Concat", ["orig_target_sizes"] * 2, ["twice"], axis=1))
             nodes.append(onnx.helper.make_node("Cast", ["twice"], ["pixels"], to=floats))
             nodes.append(onnx.helper.make_node("Mul", ["shares", "pixels"], [name]))
