@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gravity as all views of a session tell it."""
+"""Gravity as all views of a session give it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def line() -> GravityFilter:
 
 
 def taught(turns: int) -> GravityFilter:
-    """One that views around have told of gravity, each turned by 10 degrees more."""
+    """One that views around have given gravity, each turned by 10 degrees more."""
     gravity_filter = line()
     for k in range(turns):
         T = camera(10.0 * k)
@@ -37,7 +37,7 @@ def error_deg(found: np.ndarray, T_session_camera: np.ndarray) -> float:
     return float(np.degrees(np.arccos(np.clip(T_session_camera[:3, :3] @ found @ DOWN, -1.0, 1.0))))
 
 
-def test_a_first_view_is_taken_at_its_word_and_counts_little() -> None:
+def test_a_first_view_is_taken_as_it_is_and_counts_little() -> None:
     T = camera(0.0)
     found, weight = line().update(T, T[:3, :3].T @ DOWN, 1.0)
     assert found is not None and error_deg(found, T) < 1e-6
@@ -48,11 +48,11 @@ def test_views_from_around_that_err_each_its_own_way_together_err_less_and_count
     rng, gravity_filter, errors, alone = np.random.default_rng(0), line(), [], []
     for k in range(60):
         T = camera(6.0 * k, 0.1 * k)
-        told = rotation_from_vector(np.radians(1.0) * rng.standard_normal(3)) @ T[:3, :3].T @ DOWN
-        found, weight = gravity_filter.update(T, told, 1.0)
+        measured = rotation_from_vector(np.radians(1.0) * rng.standard_normal(3)) @ T[:3, :3].T @ DOWN
+        found, weight = gravity_filter.update(T, measured, 1.0)
         assert found is not None
         errors.append(error_deg(found, T))
-        alone.append(error_deg(told, T))
+        alone.append(error_deg(measured, T))
     assert np.mean(errors[30:]) < 0.5 * np.mean(alone[30:])
     assert 0.8 < weight <= 1.0
 
@@ -89,14 +89,14 @@ def test_what_is_forgotten_is_not_carried_on() -> None:
     assert taught(20).update(T, T[:3, :3].T @ DOWN, 1.0)[1] > 0.5
 
 
-def test_a_view_that_tells_nothing_is_closed_by_those_before_it() -> None:
+def test_a_view_without_gravity_gets_that_of_those_before_it() -> None:
     gravity_filter, T = taught(10), camera(110.0)
     found, weight = gravity_filter.update(T, None, 0.0)
     assert found is not None and error_deg(found, T) < 1e-6
     assert 0.0 < weight < 1.0
 
 
-def test_nothing_is_known_before_a_view_told_it() -> None:
+def test_nothing_is_known_before_a_view_gave_it() -> None:
     assert line().update(camera(0.0), None, 0.0) == (None, 0.0)
 
 

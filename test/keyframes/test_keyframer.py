@@ -89,7 +89,7 @@ def test_without_odometry_the_views_give_the_motion() -> None:
     assert np.allclose(windows[1].T_session_first, moved(0.12), atol=0.005)
 
 
-def test_where_the_newest_frame_is_in_its_session_is_told() -> None:
+def test_where_the_newest_frame_is_in_its_session_is_known() -> None:
     keyframer = Keyframer(PARAMS)
     assert keyframer.tracked is None
     for k in range(5):
@@ -148,8 +148,8 @@ def test_a_frame_that_comes_late_or_twice_is_passed_over() -> None:
 
 def test_a_first_stamp_that_nobody_set_begins_no_clock() -> None:
     frames = [frame(at, CUP, moved(0.0)) for at in (0.0, 500.0, 500.1, 500.2)]
-    unset, told = (s.clock for s in _run(Keyframer(PARAMS), frames))
-    assert unset == Clock(0, 0) and told == Clock(500 * SECOND, 1)
+    unset, set_later = (s.clock for s in _run(Keyframer(PARAMS), frames))
+    assert unset == Clock(0, 0) and set_later == Clock(500 * SECOND, 1)
     (from_zero,) = {s.clock for s in _run(Keyframer(PARAMS), [frame(0.1 * k, CUP, moved(0.03 * k)) for k in range(6)])}
     assert from_zero == Clock(0, 0)
 
@@ -212,7 +212,7 @@ def test_the_way_counts_where_nothing_is_seen_too() -> None:
     assert [round(s.travelled, 3) for s in windows] == [0.0, 8.0]
 
 
-def test_odometry_carries_what_earlier_views_told_of_gravity_and_our_own_tracking_does_not() -> None:
+def test_odometry_carries_what_earlier_views_gave_of_gravity_and_our_own_tracking_does_not() -> None:
     tilt = rotation_from_vector(np.radians([0.0, 0.0, 4.0]))
     known = [frame(0.1 * i, CUP, moved(0.03 * i)) for i in range(29)]
     tracked = [frame(0.1 * i, CUP, None, scene_view(moved(0.03 * i))) for i in range(5)]
@@ -234,7 +234,7 @@ def test_gravity_turns_with_the_camera() -> None:
             np.testing.assert_allclose(item.gravity, inverse(T)[:3, :3] @ [0.0, 1.0, 0.0], atol=1e-9)
 
 
-def test_a_stretch_tells_how_much_memory_its_frames_hold() -> None:
+def test_a_window_states_how_much_memory_its_frames_hold() -> None:
     seen = frame(0.0, CUP)
     assert seen.view.grey is not None
     (cup,) = CUP

@@ -26,8 +26,8 @@ Making = Callable[..., KeyframerNode]
 def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Making]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
 
-    def made(*words: str) -> KeyframerNode:
-        rclpy.init(args=["keyframer", "--ros-args", "-r", "__ns:=/robot1", *words])
+    def made(*arguments: str) -> KeyframerNode:
+        rclpy.init(args=["keyframer", "--ros-args", "-r", "__ns:=/robot1", *arguments])
         node = KeyframerNode()
         node.frame_of = lambda seen: (seen, None)  # type: ignore[method-assign,assignment]
         return node

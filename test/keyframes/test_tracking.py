@@ -76,7 +76,7 @@ def test_a_motion_is_believed_where_most_of_the_view_agrees(nearer: int, found: 
 
 
 @pytest.mark.parametrize(("side", "found"), [(30, False), (60, True)])
-def test_a_few_pixels_tell_no_motion(side: int, found: bool) -> None:
+def test_a_few_pixels_give_no_motion(side: int, found: bool) -> None:
     view = scene_view(MOTIONS[0])
     xyz = np.full_like(view.xyz, np.nan)
     xyz[30 : 30 + side, 60 : 60 + side] = view.xyz[30 : 30 + side, 60 : 60 + side]

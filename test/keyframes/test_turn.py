@@ -36,14 +36,14 @@ def test_a_brighter_picture_did_not_turn() -> None:
     assert error_deg(R, np.eye(4)) < 0.2 and difference < 2.0
 
 
-def test_a_guess_is_gone_on_from_and_pictures_that_do_not_overlap_tell_nothing() -> None:
+def test_a_guess_is_gone_on_from_and_pictures_that_do_not_overlap_give_nothing() -> None:
     pictures = small_pictures(scene_view())
     R, _ = turn_between(small_pictures(scene_view(turned(0, 14, 0))), pictures, turned(0, 12, 0)[:3, :3])
     assert error_deg(R, turned(0, 14, 0)) < 1.0
     assert turn_between(pictures, pictures, turned(0, 90, 0)[:3, :3])[1] == np.inf
 
 
-def test_a_fast_turn_is_told_from_a_slow_one() -> None:
+def test_a_fast_turn_is_distinguished_from_a_slow_one() -> None:
     last = LastPicture()
     assert last.next(scene_view()) == (None, False)  # nothing came before
     slow, fast = last.next(scene_view(turned(0, 1, 0))), last.next(scene_view(turned(0, 7, 0)))
