@@ -50,8 +50,8 @@ def test_no_file_skips_as_it_is_imported() -> None:
         assert not called & {"pytest.importorskip", "pytest.skip", "importorskip", "skip"}, path
 
 
-def suite(folder: Path, files: dict[str, str], *words: str) -> tuple[int, str]:
-    """The exit status and the words of a session over a small suite with this suite's conftest.py."""
+def suite(folder: Path, files: dict[str, str], *arguments: str) -> tuple[int, str]:
+    """The exit status and the output of a session over a small suite with this suite's conftest.py."""
     (folder / "test").mkdir()
     shutil.copy(TESTS / "conftest.py", folder / "test/conftest.py")
     (folder / "pytest.ini").write_text("[pytest]\ntestpaths = test\naddopts = -q -rs -p no:cacheprovider\n")
@@ -62,7 +62,7 @@ def suite(folder: Path, files: dict[str, str], *words: str) -> tuple[int, str]:
     environment = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}
     environment |= {"PYTHONPATH": str(folder), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     said = subprocess.run(
-        [sys.executable, "-m", "pytest", *words], cwd=folder, env=environment, capture_output=True, text=True
+        [sys.executable, "-m", "pytest", *arguments], cwd=folder, env=environment, capture_output=True, text=True
     )
     return said.returncode, said.stdout
 
@@ -107,7 +107,7 @@ def test_it(number, domain) -> None:
 
 @pytest.fixture
 def workers() -> tuple[str, ...]:
-    """The words that let two processes share the tests; the test skips where xdist is not installed."""
+    """The arguments that let two processes share the tests; the test skips where xdist is not installed."""
     if find_spec("xdist") is None:
         pytest.skip("pytest-xdist is not installed")
     return (

@@ -67,15 +67,15 @@ def point_cloud(**changes: Any) -> images.PointCloud:
     return images.PointCloud(**{"xyz": floats(1, 7, 3), "rgb": None, "stamp_ns": 5, **changes})
 
 
-WORDS = (cloud, view, frame, detections, closure, alignment, depth_image, point_cloud)
+MAKERS = (cloud, view, frame, detections, closure, alignment, depth_image, point_cloud)
 
 
-@pytest.mark.parametrize("make", WORDS)
-def test_a_word_is_frozen_and_its_arrays_are_read_only(make: Any) -> None:
-    word = make()
-    values = {part.name: getattr(word, part.name) for part in fields(word)}
+@pytest.mark.parametrize("make", MAKERS)
+def test_a_value_is_frozen_and_its_arrays_are_read_only(make: Any) -> None:
+    made = make()
+    values = {part.name: getattr(made, part.name) for part in fields(made)}
     with pytest.raises(FrozenInstanceError):
-        setattr(word, next(iter(values)), None)
+        setattr(made, next(iter(values)), None)
     for array in (value for value in values.values() if isinstance(value, np.ndarray) and value.size):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 1
@@ -83,9 +83,9 @@ def test_a_word_is_frozen_and_its_arrays_are_read_only(make: Any) -> None:
 
 def test_the_array_that_was_given_stays_writable() -> None:
     xyz = floats(4, 3)
-    word = cloud(xyz=xyz)
+    made = cloud(xyz=xyz)
     xyz[0, 0] = 7
-    assert word.xyz[0, 0] == 7  # a view: nothing was copied
+    assert made.xyz[0, 0] == 7  # a view: nothing was copied
 
 
 def far(metres: float) -> np.ndarray:
@@ -152,7 +152,7 @@ NOT_SYMMETRIC = np.eye(6) + np.eye(6, k=1)
         (point_cloud, {"rgb": np.zeros((7, 1, 3), np.uint8)}, "PointCloud.rgb: expected uint8 of shape (H, W, 3)"),
     ],
 )  # fmt: skip
-def test_a_broken_word_is_refused_with_expected_and_got(make: Any, changes: dict, complaint: str) -> None:
+def test_a_broken_value_is_refused_with_expected_and_got(make: Any, changes: dict, complaint: str) -> None:
     with pytest.raises(ValueError) as refused:
         make(**changes)
     assert complaint in str(refused.value)
@@ -210,7 +210,7 @@ def test_a_cloud_of_one_row_is_not_organised() -> None:
     assert not point_cloud().organised and point_cloud(xyz=floats(2, 3, 3)).organised
 
 
-def test_words_are_compared_by_identity() -> None:
+def test_values_are_compared_by_identity() -> None:
     assert closure() != closure()
 
 
@@ -271,7 +271,7 @@ def test_a_box_touches_the_pixels_that_it_covers_in_part_and_none_outside_the_pi
     ]  # fmt: skip
 
 
-def test_robots_may_be_the_same_as_far_as_both_are_told() -> None:
+def test_robots_may_be_the_same_as_far_as_both_are_known() -> None:
     one = closure(from_robot="a", to_robot="b")
     assert one.robots == ("a", "b") and closure().robots == ("", "")
     assert closures.may_be_same(one.robots, ("", "")) and closures.may_be_same(one.robots, ("a", ""))
@@ -284,10 +284,10 @@ def test_a_frame_gets_the_prefix_of_its_robot_once() -> None:
     assert framed("r1", "r10/camera") == "r1/r10/camera"
 
 
-def test_a_frame_tells_its_robot_by_the_longest_name() -> None:
+def test_a_frame_names_its_robot_by_the_longest_name() -> None:
     robots = ["r1", "fleet", "fleet/r1"]
-    told = [robot_of(frame_id, robots) for frame_id in ("r1/camera", "fleet/r1/camera", "r10/camera", "camera")]
-    assert told == ["r1", "fleet/r1", "", ""]
+    found = [robot_of(frame_id, robots) for frame_id in ("r1/camera", "fleet/r1/camera", "r10/camera", "camera")]
+    assert found == ["r1", "fleet/r1", "", ""]
 
 
 def test_a_refusal_of_a_closure_has_every_field_that_they_share() -> None:

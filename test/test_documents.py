@@ -68,7 +68,7 @@ def anchors_of_findings() -> set[str]:
     for path in REPOSITORY.glob("objreg_*/**/*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "Finding":
-                given = [*node.args[3:4], *(word.value for word in node.keywords if word.arg == "anchor")]
+                given = [*node.args[3:4], *(keyword.value for keyword in node.keywords if keyword.arg == "anchor")]
                 found |= {str(value.value) for value in given if isinstance(value, ast.Constant)}
     return found
 

@@ -56,8 +56,8 @@ def test_a_golden_file_holds_several_constraints_and_refusals_with_their_numbers
 
 def test_the_golden_files_hold_refusals_with_poses_and_numbers() -> None:
     refusals = [row for name in runs.SOURCES for row in files.read(name).results["refusals"]]
-    told = [row["reason"] for row in refusals if row["T_from_to"] is not None and row["detail"] != ""]
-    assert len(told) >= LEAST and len(set(told)) >= FEW
+    reasons = [row["reason"] for row in refusals if row["T_from_to"] is not None and row["detail"] != ""]
+    assert len(reasons) >= LEAST and len(set(reasons)) >= FEW
 
 
 @pytest.mark.parametrize("name", runs.SOURCES)
@@ -200,7 +200,7 @@ def test_a_check_fails_where_a_digit_differs_and_writes_nothing(
     assert files.path_of("loop").read_text(encoding="utf-8") == text
 
 
-def test_what_is_recorded_anew_is_written_after_what_changed_was_told(
+def test_what_is_recorded_anew_is_written_after_what_changed_was_printed(
     results: dict[str, Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     golden = files.read("loop")
@@ -209,6 +209,6 @@ def test_what_is_recorded_anew_is_written_after_what_changed_was_told(
     monkeypatch.setattr(files, "FOLDER", tmp_path)
     monkeypatch.setattr(record, "_recorded", lambda *_: now)
     assert record.main(["loop"]) == 0
-    told = f"loop: {len(results['constraints'])} constraints, {len(results['refusals'])} refusals, 2 differences"
-    assert told in capsys.readouterr().out
+    summary = f"loop: {len(results['constraints'])} constraints, {len(results['refusals'])} refusals, 2 differences"
+    assert summary in capsys.readouterr().out
     assert files.read("loop").results == now.results

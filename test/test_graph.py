@@ -8,7 +8,7 @@ import pytest
 from objreg_tools.graph import STAGES, chosen
 
 
-def test_without_names_it_is_the_three_rooms() -> None:
+def test_without_names_it_is_the_three_stages() -> None:
     assert chosen([]) == chosen(["--ros-args", "-p", "detector:threshold:=0.4"]) == list(STAGES)
 
 

@@ -16,8 +16,8 @@ CODE = "import importlib, sys; importlib.import_module(sys.argv[1]); print(*(set
 
 def heavy_after(module: str) -> str:
     """Which heavy libraries a fresh process has loaded after the import of ``module``."""
-    words = [sys.executable, "-c", CODE, module, *HEAVY]
-    return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    command = [sys.executable, "-c", CODE, module, *HEAVY]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def imports(path: Path) -> set[str]:
             "importlib.import_module",
             "extra.load",
         ):
-            found |= {word.value for word in node.args[:1] if isinstance(word, ast.Constant)}
+            found |= {name.value for name in node.args[:1] if isinstance(name, ast.Constant)}
     return found
 
 

@@ -131,9 +131,9 @@ def test_masks_are_rectified_as_depth_is_whatever_their_size(scale: int) -> None
     of = lens("plumb_bob")
     numbers = np.zeros((240 * scale, 320 * scale), np.uint16)
     numbers[60 * scale : 200 * scale, 30 * scale : 130 * scale] = 1
-    told = Detections(xyxy=np.array([[30, 60, 130, 200]], np.float32) * scale, score=np.ones(1, np.float32),
-                      label=("cup",), image_hw=numbers.shape, stamp_ns=5, instances=numbers)  # fmt: skip
-    found = of.rectify_detections(told).instances
+    detections = Detections(xyxy=np.array([[30, 60, 130, 200]], np.float32) * scale, score=np.ones(1, np.float32),
+                            label=("cup",), image_hw=numbers.shape, stamp_ns=5, instances=numbers)  # fmt: skip
+    found = of.rectify_detections(detections).instances
     np.testing.assert_array_equal(found, of.rectify_depth(np.ascontiguousarray(numbers[::scale, ::scale])))
     assert not np.array_equal(found, numbers[::scale, ::scale])
 

@@ -82,12 +82,12 @@ def test_two_pictures_with_masks_give_the_pose_of_camera_2_in_camera_1() -> None
 
 def test_boxes_do_as_well_and_so_do_detections() -> None:
     boxes = register(*PICTURES, CAMERA, detections=(ONE.boxes, TWO.boxes))
-    words = register(*PICTURES, CAMERA, detections=(word(ONE), word(TWO)))
+    found = register(*PICTURES, CAMERA, detections=(detections_of(ONE), detections_of(TWO)))
     assert_right(boxes)
-    assert words.T_1_2 is not None and boxes.T_1_2 is not None and np.array_equal(words.T_1_2, boxes.T_1_2)
+    assert found.T_1_2 is not None and boxes.T_1_2 is not None and np.array_equal(found.T_1_2, boxes.T_1_2)
 
 
-def word(of: Shot) -> Detections:
+def detections_of(of: Shot) -> Detections:
     return Detections(
         xyxy=np.array([box for box, _, _ in of.boxes], np.float32),
         score=np.array([score for _, _, score in of.boxes], np.float32),
@@ -137,7 +137,7 @@ def test_the_models_own_labels_are_found_where_nothing_is_said_of_objects() -> N
     assert isinstance(frame, Frame)
 
 
-def test_a_gate_of_ones_own_refuses_and_its_reason_and_our_evidence_are_told() -> None:
+def test_a_gate_of_ones_own_refuses_and_its_reason_and_our_evidence_are_reported() -> None:
     refused = register(
         *PICTURES, CAMERA, detections=MASKS, gate=lambda candidates, prior=None: (Reason.MOVED, "all of it")
     )

@@ -57,8 +57,8 @@ def test_flake8_finds_no_fault(main: Callable[..., Callable[..., int]], tmp_path
 
 def test_pep257_finds_no_fault(main: Callable[..., Callable[..., int]], capsys: pytest.CaptureFixture[str]) -> None:
     status = main("ament_pep257")(["--add-ignore", *PEP257, "--", *CHECKED])
-    told = capsys.readouterr()
-    assert status == 0, told.out + told.err
+    output = capsys.readouterr()
+    assert status == 0, output.out + output.err
 
 
 def test_the_manifests_are_valid(main: Callable[..., Callable[..., int]], capsys: pytest.CaptureFixture[str]) -> None:
@@ -66,10 +66,10 @@ def test_the_manifests_are_valid(main: Callable[..., Callable[..., int]], capsys
     if shutil.which("xmllint") is None:
         pytest.skip("xmllint is not installed")
     status = command(["package.xml", "objreg_msgs/package.xml"])
-    told = capsys.readouterr()
-    if "download.ros.org" in told.err and "failed to load" in told.err:
+    output = capsys.readouterr()
+    if "download.ros.org" in output.err and "failed to load" in output.err:
         pytest.skip("the schema of manifests cannot be loaded: no network")
-    assert status == 0, told.out + told.err
+    assert status == 0, output.out + output.err
 
 
 def test_the_licences_are_known_to_ament(main: Callable[..., Callable[..., int]]) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 OBJREG = [sys.executable, "-m", "objreg_tools"]
-SIGNALLED = (128 + signal.SIGINT, -signal.SIGINT)  # told by the command, or by the system before it
+SIGNALLED = (128 + signal.SIGINT, -signal.SIGINT)  # given by the command, or by the system before it
 IN_IMPORT = """
 import signal, sys
 
@@ -69,10 +69,10 @@ main()
 """
 
 
-def ended(words: list[str]) -> tuple[int, str]:
+def ended(command: list[str]) -> tuple[int, str]:
     """The status of a command and what it says as it ends."""
-    told = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
-    return told.returncode, told.stderr
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return done.returncode, done.stderr
 
 
 @pytest.mark.parametrize("module", ["click", "objreg_tools.cli.commands.inspect", "numpy", "cv2", "rosbags.interfaces"])
@@ -111,23 +111,23 @@ def test_an_interrupt_that_is_ignored_from_outside_stays_so(tmp_path: Path) -> N
     assert status == 1 and "no such file" in said
 
 
-def test_a_reader_who_leaves_ends_the_command_without_a_word() -> None:
+def test_a_reader_who_leaves_ends_the_command_silently() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     with os.fdopen(writing, "wb") as closed:
-        told = subprocess.run([*OBJREG, "params"], stdout=closed, stderr=subprocess.PIPE, text=True, check=False)
-    assert (told.returncode, told.stderr) == (141, "")
+        done = subprocess.run([*OBJREG, "params"], stdout=closed, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_an_output_that_is_full_is_one_line() -> None:
     if not Path("/dev/full").exists():
         pytest.skip("this system has no /dev/full")
     with Path("/dev/full").open("wb") as full:
-        told = subprocess.run([*OBJREG, "params"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert told.returncode == 1 and told.stderr.count("\n") == 1
-    assert told.stderr.startswith("objreg: standard output: expected a place that takes it, got: No space left")
+        done = subprocess.run([*OBJREG, "params"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("objreg: standard output: expected a place that takes it, got: No space left")
 
 
 def test_the_version_is_that_of_the_package(repository: Path) -> None:
-    told = subprocess.run([*OBJREG, "--version"], capture_output=True, text=True, check=True).stdout
-    assert f"<version>{told.split()[1]}</version>" in (repository / "package.xml").read_text()
+    output = subprocess.run([*OBJREG, "--version"], capture_output=True, text=True, check=True).stdout
+    assert f"<version>{output.split()[1]}</version>" in (repository / "package.xml").read_text()

@@ -16,11 +16,11 @@ VERBS = {"track", "search", "process"}
 
 
 def test_the_map_names_every_module_of_the_folder_and_no_other() -> None:
-    for room in STAGES:
-        package = importlib.import_module(f"objreg_ros.{room}")
+    for stage in STAGES:
+        package = importlib.import_module(f"objreg_ros.{stage}")
         modules = {module.name for module in pkgutil.iter_modules(package.__path__) if not module.ispkg}
         named = set(re.findall(r"`(\w+)`", package.__doc__ or "")) - VERBS
-        assert named == modules, room
+        assert named == modules, stage
 
 
 def test_the_map_of_registration_names_its_folders_in_their_order() -> None:

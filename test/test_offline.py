@@ -13,7 +13,7 @@ import pytest
 from bridge.trees import said, transform
 from recording.sample_folders import CAMERA, records, uncalibrated
 from recording.vision import detected
-from simple_rooms import OneBox, simple_rooms
+from simple_stages import OneBox, simple_stages
 
 from objreg_ros import pipeline
 from objreg_ros.bridge.camera.frames import FrameTree
@@ -41,7 +41,7 @@ MS = 1_000_000
 
 
 def test_every_frame_goes_through_with_its_odometry() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(records(4), stages, INPUTS)
     assert (run.frames, run.detections, run.objects, len(run.closures)) == (4, 4, 4, 3)
     assert [frame.T_odom_camera[0, 3] for frame in chain.frames] == pytest.approx([0, 0.1, 0.2, 0.3])
@@ -49,7 +49,7 @@ def test_every_frame_goes_through_with_its_odometry() -> None:
 
 
 def test_colour_reaches_the_segmenter_registered_to_depth() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run_offline(records(3), stages, INPUTS)
     assert [frame.objects[0].rgb.tolist() for frame in chain.frames] == [[[i, 20, 30]] for i in range(3)]
     assert [round(float(frame.objects[0].xyz[0, 2]), 3) for frame in chain.frames] == [1.0, 1.001, 1.002]
@@ -57,19 +57,19 @@ def test_colour_reaches_the_segmenter_registered_to_depth() -> None:
 
 @pytest.mark.parametrize("topic", ["/yolo/detections", "/yolo/instance_masks"])
 def test_recorded_detections_take_the_place_of_the_detector(topic: str) -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     recorded = RecordedDetections(topic, "/yolo/label_info")
     run = run_offline(detected(4), stages, INPUTS, recorded=recorded)
     assert (run.frames, run.detections, run.objects) == (4, 4, 4) and not run.dropped
     assert [row["labels"] for row in run.glimpses] == [["mug"]] * 4
     assert "detect" not in run.stage_s and chain.frames[1].T_odom_camera is not None
-    without = run_offline(detected(4), simple_rooms()[0], INPUTS, recorded=RecordedDetections(topic))
+    without = run_offline(detected(4), simple_stages()[0], INPUTS, recorded=RecordedDetections(topic))
     assert without.frames == 4 and without.glimpses[0]["labels"] != ["mug"]
 
 
 def test_recorded_boxes_and_masks_are_those_of_their_picture() -> None:
     for topic in ("/yolo/detections", "/yolo/instance_masks"):
-        stages, _ = simple_rooms()
+        stages, _ = simple_stages()
         segmented: list[Detections] = []
         segment = stages.segmenter.segment
 
@@ -91,27 +91,27 @@ def test_a_picture_whose_recorded_detections_are_missing_or_broken_is_dropped_wi
     there = [
         Record.of(r.topic, broken, r.stamp_ns) if r.stamp_ns == 1250 * MS and "detec" in r.topic else r for r in there
     ]
-    run = run_offline(there, simple_rooms()[0], INPUTS, recorded=RecordedDetections("/yolo/detections"))
+    run = run_offline(there, simple_stages()[0], INPUTS, recorded=RecordedDetections("/yolo/detections"))
     assert run.frames == 2 and run.dropped == {"malformed_detections": 1, "depth_unmatched": 2}
     assert "expected a finite box" in run.complaints["malformed_detections"]
 
 
 def test_colour_can_be_left_out() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(records(3), stages, INPUTS, LineParams(SegmenterNodeParams(colour=False)))
     assert run.frames == run.detections == 3
     assert [frame.objects[0].rgb for frame in chain.frames] == [None] * 3
 
 
 def test_without_odometry_frames_go_through_without_it() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(records(3), stages, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))
     assert run.frames == 3 and all(frame.T_odom_camera is None for frame in chain.frames)
     assert run.rejected == {"no_candidate": 2}
 
 
 def test_a_run_can_stop_early() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(records(9), stages, INPUTS, max_frames=4)
     assert run.frames == len(chain.frames) == 4 and chain.finished
 
@@ -131,14 +131,14 @@ def at_30_hz(count: int, depth_late_ms: float = 0.0) -> list[Record]:
 
 @pytest.mark.parametrize("depth_late_ms", [0.0, 9.0, 15.0, -9.0])
 def test_pictures_that_come_faster_than_they_are_wanted_are_surplus_with_their_depth(depth_late_ms: float) -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(at_30_hz(12, depth_late_ms), stages, INPUTS, LineParams(max_rate=10.0))
     taken = [round((frame.stamp_ns / MS - 1000 - depth_late_ms) * 30 / 1000) for frame in chain.frames]
     assert taken == [0, 3, 6, 9] and run.dropped == {"depth_surplus": 8}
 
 
 def test_surplus_pictures_are_not_decoded() -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     run = run_offline(at_30_hz(12), stages, INPUTS, LineParams(max_rate=10.0))
     assert len(run.stage_s["detect"]) == len(run.stage_s["segment"]) == 4
 
@@ -148,27 +148,27 @@ def without(topic: str, stamp_ns: int) -> Iterator[Record]:
 
 
 def test_a_depth_image_without_colour_is_dropped_with_a_reason() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(without("/image", 1100 * MS), stages, INPUTS)
     assert [frame.stamp_ns // MS for frame in chain.frames] == [1000, 1200, 1300]
     assert run.dropped == {"depth_unmatched": 1}
 
 
-def test_frames_without_odometry_tell_where_our_own_tracking_has_the_camera() -> None:
-    stages, _ = simple_rooms()
+def test_frames_without_odometry_state_where_our_own_tracking_has_the_camera() -> None:
+    stages, _ = simple_stages()
     run = run_offline(records(3), stages, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))
     assert [row["tracked"] for row in run.glimpses] == [{"session": 0, "T_session_camera": np.eye(4).tolist()}] * 3
-    assert not any("tracked" in row for row in run_offline(records(3), simple_rooms()[0], INPUTS).glimpses)
+    assert not any("tracked" in row for row in run_offline(records(3), simple_stages()[0], INPUTS).glimpses)
 
 
 def test_a_frame_whose_odometry_was_lost_goes_through_without() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run_offline(without("/odom", 1100 * MS), stages, INPUTS)
     assert [frame.T_odom_camera is None for frame in chain.frames] == [False, True, False, False]
 
 
 def test_a_frame_between_two_odometry_messages_has_a_pose_between_theirs() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     wanted = {1000 * MS: 970, 1100 * MS: 1070, 1200 * MS: 1170, 1300 * MS: 1270}  # each 30 ms before its frame
     shifted = []
     for record in records(4):
@@ -185,7 +185,7 @@ def test_a_frame_between_two_odometry_messages_has_a_pose_between_theirs() -> No
 
 
 def test_the_mounting_of_the_camera_is_applied() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     T_base_camera = np.eye(4)
     T_base_camera[2, 3] = 0.7
     run_offline(
@@ -195,7 +195,7 @@ def test_the_mounting_of_the_camera_is_applied() -> None:
 
 
 def test_gravity_comes_from_a_level_odometry_where_there_is_one() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     looking_along_x = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
     T_level_camera = as_parameter(looking_along_x @ turned_about_x(np.radians(30.0)))
     timing = LineParams(SegmenterNodeParams(level_odom=True, T_base_camera=T_level_camera))
@@ -214,29 +214,29 @@ def felt(degrees: float, frame_id: str = "camera") -> Iterator[Record]:
 
 
 def test_gravity_comes_from_an_imu_in_the_cameras_frame_with_how_sure_it_is() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run_offline(felt(30.0), stages, replace(INPUTS, imu="/imu"))
     assert len(chain.frames) == 4
     for frame in chain.frames:
         expected = [0, np.cos(np.radians(30)), np.sin(np.radians(30))]
         np.testing.assert_allclose(frame.gravity, expected, atol=1e-4)
-    assert 1.0 < stages.segmenter.heard_sigma_deg[-1] < stages.segmenter.heard_sigma_deg[0] < 3.1
+    assert 1.0 < stages.segmenter.received_sigma_deg[-1] < stages.segmenter.received_sigma_deg[0] < 3.1
 
 
-def test_the_mounting_of_the_imu_is_applied_and_without_one_it_tells_nothing() -> None:
-    stages, chain = simple_rooms()
+def test_the_mounting_of_the_imu_is_applied_and_without_one_it_gives_nothing() -> None:
+    stages, chain = simple_stages()
     timing = LineParams(SegmenterNodeParams(T_camera_imu=as_parameter(turned_about_x(np.radians(-30.0)))))
     run_offline(felt(30.0, "imu"), stages, replace(INPUTS, imu="/imu"), timing)
     for frame in chain.frames:
         np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-4)
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(felt(30.0, "imu"), stages, replace(INPUTS, imu="/imu"))
-    assert stages.segmenter.heard_sigma_deg == [None] * 4 and run.frames == 4
+    assert stages.segmenter.received_sigma_deg == [None] * 4 and run.frames == 4
     assert run.summary(Truth([]))["gravity"]["imu_passed_over"] == {"unknown_frame": 4}
 
 
 def test_an_imu_that_measures_nonsense_ends_nothing_and_is_counted() -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     nan = Record.of("/imu", messages.imu((np.nan, 0, 0), None, 1050 * MS, "camera"), 1050 * MS)
     zero = Record.of("/imu", messages.imu((0, 0, 0), None, 1060 * MS, "camera"), 1060 * MS)
     said = sorted([*records(4), nan, zero], key=lambda record: record.stamp_ns)
@@ -264,7 +264,7 @@ def broken() -> Iterator[Record]:
 
 
 def test_broken_messages_are_counted_and_the_run_goes_on() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(broken(), stages, INPUTS)
     assert len(chain.frames) == 1
     assert run.dropped == {"malformed_depth": 1, "malformed_image": 1, "depth_unmatched": 1}
@@ -292,7 +292,7 @@ def undecodable(topic: str, stamp_ns: int) -> Iterator[Record]:
 def test_a_message_that_does_not_decode_is_counted_and_the_run_goes_on(
     topic: str, frames: int, dropped: dict[str, int]
 ) -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     run = run_offline(undecodable(topic, 1100 * MS), stages, INPUTS)
     assert (run.frames, run.dropped) == (frames, dropped)
     assert "expected a whole bag" in next(iter(run.complaints.values()))
@@ -303,7 +303,7 @@ def test_a_recording_that_breaks_off_ends_the_run() -> None:
         yield from records(2)
         raise ValueError("expected a whole bag")
 
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     with pytest.raises(ValueError, match="expected a whole bag"):
         run_offline(breaking(), stages, INPUTS)
 
@@ -318,15 +318,15 @@ def lost() -> Iterator[Record]:
 
 
 def test_an_odometry_that_is_no_pose_is_counted_and_its_frame_goes_through_without() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(lost(), stages, INPUTS)
     assert [frame.T_odom_camera is None for frame in chain.frames] == [False, True, False, False]
     assert (run.frames, run.dropped) == (4, {"malformed_odom": 1})
     assert "quaternion of non-zero length" in run.complaints["malformed_odom"]
 
 
-def test_a_bug_in_a_room_is_not_taken_for_a_broken_message() -> None:
-    stages, chain = simple_rooms()
+def test_a_bug_in_a_stage_is_not_taken_for_a_broken_message() -> None:
+    stages, chain = simple_stages()
 
     def fail(frame: object) -> None:
         raise ValueError("a bug")
@@ -340,7 +340,7 @@ def test_the_same_recording_gives_the_same_json() -> None:
     truth = Truth([(10**9, np.eye(4)), (11 * 10**8, np.eye(4))])
     texts = []
     for _ in range(2):
-        stages, _ = simple_rooms()
+        stages, _ = simple_stages()
         summary = run_offline(records(4), stages, INPUTS).summary(truth)
         assert set(summary.pop("stage_ms")) == {"decode", "detect", "segment", "check", "register"}
         texts.append(json.dumps(summary))
@@ -348,7 +348,7 @@ def test_the_same_recording_gives_the_same_json() -> None:
 
 
 def test_the_json_has_the_keys_that_others_rely_on() -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     summary = run_offline(records(4), stages, INPUTS).summary(Truth([(10**9, np.eye(4)), (11 * 10**8, np.eye(4))]))
     wanted = {"frames", "detections", "objects", "constraints", "rejected", "stage_ms", "truth"}
     assert wanted <= set(summary)
@@ -361,7 +361,7 @@ def test_the_json_has_the_keys_that_others_rely_on() -> None:
 
 
 def test_where_the_camera_is_in_an_earlier_map_is_in_the_json_since_when_it_was_known() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     process, later = chain.process, np.eye(4)
     later[0, 3] = 2.0
 
@@ -389,12 +389,12 @@ def test_where_the_camera_is_in_an_earlier_map_is_in_the_json_since_when_it_was_
 
 
 def test_where_nothing_is_known_of_an_earlier_map_the_json_has_none() -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     assert run_offline(records(2), stages, INPUTS).summary(Truth([]))["relocalised"] is None
 
 
 def test_what_the_wire_rounds_is_rounded() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run_offline(records(1), stages, INPUTS)
     frame = chain.frames[0]
     assert frame.objects[0].density == float(np.float32(0.1)) != 0.1
@@ -403,7 +403,7 @@ def test_what_the_wire_rounds_is_rounded() -> None:
 
 
 def test_points_go_through_the_organiser(monkeypatch: pytest.MonkeyPatch) -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     rows["z"] = 2
     seen = []
@@ -423,7 +423,7 @@ def test_points_go_through_the_organiser(monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize(("height", "frames"), [(48, 2), (1, 0)])
 def test_a_camera_that_is_not_calibrated_stops_only_clouds_that_need_one(height: int, frames: int) -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     xyz = back_project(1.5 + np.random.default_rng(1).random((48, 64)), 50.0, 50.0, 31.5, 23.5)
     rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     for axis, name in enumerate("xyz"):
@@ -438,8 +438,8 @@ def test_a_camera_that_is_not_calibrated_stops_only_clouds_that_need_one(height:
     assert frames or "expected a calibrated K" in run.complaints["malformed_camera_info"]
 
 
-def test_the_json_tells_of_every_frame_and_every_refusal() -> None:
-    stages, _ = simple_rooms()
+def test_the_json_has_every_frame_and_where_its_objects_are() -> None:
+    stages, _ = simple_stages()
     run = run_offline(records(4), stages, INPUTS)
     summary = json.loads(json.dumps(run.summary(Truth([]))))
     assert [row["T_odom_camera"][0][3] for row in summary["glimpses"]] == pytest.approx([0, 0.1, 0.2, 0.3])
@@ -447,8 +447,8 @@ def test_the_json_tells_of_every_frame_and_every_refusal() -> None:
     assert summary["glimpses"][2]["objects"] == [["cup", [0.0, 0.0, 1.002]]]
 
 
-def test_the_json_tells_of_every_refusal() -> None:
-    stages, _ = simple_rooms()
+def test_the_json_has_every_refusal() -> None:
+    stages, _ = simple_stages()
     run = run_offline(without("/odom", 1100 * MS), stages, INPUTS)
     expected = {"reason": "no_candidate", "from_ns": 1100 * MS, "to_ns": 1200 * MS, "detail": "no odometry"}
     stated = run.summary(Truth([]))["refusals"][1]
@@ -456,7 +456,7 @@ def test_the_json_tells_of_every_refusal() -> None:
 
 
 def of_a_lens(frames: int, model: str = "plumb_bob", **names: str) -> Iterator[Record]:
-    """The records, with a camera_info that tells of a lens; ``names`` call topics otherwise."""
+    """The records, with a camera_info that states a lens; ``names`` call topics otherwise."""
     for record in records(frames):
         message = record.message
         if record.topic == "/camera_info":
@@ -467,7 +467,7 @@ def of_a_lens(frames: int, model: str = "plumb_bob", **names: str) -> Iterator[R
 
 def seen_of_a_lens(records: Iterator[Record], inputs: Inputs, rectified: str = "auto") -> tuple[Any, list[Any]]:
     """What a run gives, and the depth image and the box of each frame that reached the segmenter."""
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     met: list[Any] = []
 
     def segment(detections: Detections, depth: DepthImage, gravity: Any = None, **more: Any) -> Frame:
@@ -501,14 +501,14 @@ def test_pictures_whose_topics_say_that_they_are_rectified_reach_it_as_they_are(
 
 
 def test_frames_of_a_lens_that_nobody_knows_are_dropped_with_what_to_do() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(of_a_lens(3, "nobody's"), stages, INPUTS)
     assert chain.frames == [] and run.dropped == {"malformed_depth": 3}
     assert 'got "nobody\'s"; set segmenter.rectified to all' in run.complaints["malformed_depth"]
 
 
-def test_a_run_tells_what_its_frames_told_of_their_sensor() -> None:
-    stages, _ = simple_rooms()
+def test_a_run_states_what_its_frames_show_of_their_sensor() -> None:
+    stages, _ = simple_stages()
     sensor = SimpleNamespace(
         noise=1.234567, lag=Lag(24.0, 3.5), depth_to_colour=SimpleNamespace(text=lambda: "0.50 deg")
     )
@@ -518,8 +518,8 @@ def test_a_run_tells_what_its_frames_told_of_their_sensor() -> None:
     assert summary["depth_lag"] == {"ms": 24.0, "sigma_ms": 3.5}
 
 
-def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
-    stages, _ = simple_rooms()
+def test_a_run_whose_frames_show_nothing_of_their_sensor_states_none() -> None:
+    stages, _ = simple_stages()
     stated = SimpleNamespace(segment=stages.segmenter.segment, choice=stages.segmenter.choice, sensor=SensorEstimate())
     summary = run_offline(records(2), replace(stages, segmenter=stated), INPUTS).summary(Truth([]))
     assert summary["depth_noise"] is None and summary["depth_lag"] is None
@@ -532,14 +532,14 @@ def tied(place: np.ndarray, parent: str = "base", child: str = "camera") -> Line
     return LineParams(frames=tree)
 
 
-def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames_unless_it_is_told() -> None:
+def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames_unless_it_is_given() -> None:
     place = turned_about_x(0.3)
-    (stages, chain), (told_rooms, told_chain) = simple_rooms(), simple_rooms()
+    (stages, chain), (given_stages, given_chain) = simple_stages(), simple_stages()
     run = run_offline(map(other_body, records(2)), stages, INPUTS, tied(place))
     stated = replace(tied(np.eye(4)), registrar=FramesParams(T_base_camera=as_parameter(place)))
-    run_offline(map(other_body, records(2)), told_rooms, INPUTS, stated)
+    run_offline(map(other_body, records(2)), given_stages, INPUTS, stated)
     assert "/tf_static has the camera's 'camera' on the odometry's 'base'" in run.mount
-    for frame, other in zip(chain.frames, told_chain.frames, strict=True):
+    for frame, other in zip(chain.frames, given_chain.frames, strict=True):
         np.testing.assert_allclose(frame.T_odom_camera, other.T_odom_camera, atol=1e-9)
         np.testing.assert_allclose(frame.T_odom_camera[:3, :3], place[:3, :3], atol=1e-9)
 
@@ -547,7 +547,7 @@ def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames
 def test_gravity_of_a_level_odometry_is_turned_by_the_same_place() -> None:
     place = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
 
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run_offline(
         map(other_body, records(2)),
         stages,
@@ -571,14 +571,14 @@ def with_joint(recorded: list[Record], reaches: int) -> Iterator[Record]:
 
 
 def test_frames_wait_for_the_joint_that_carries_their_camera() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     run = run_offline(with_joint(list(records(4)), 4), stages, INPUTS)
     angles = [rotation_angle(frame.T_odom_camera[:3, :3]) for frame in chain.frames]
     assert angles[1:] == pytest.approx([0.1, 0.2, 0.3], abs=1e-9) and "by a joint, which is followed" in run.mount
 
 
 def test_odometry_of_a_body_that_nothing_ties_to_the_camera_is_taken_as_the_cameras_and_said() -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     run = run_offline(map(other_body, records(2)), stages, INPUTS)
     assert "the registrar measures it" in run.mount
 
@@ -594,7 +594,7 @@ def test_what_the_masks_of_a_model_cover_is_the_objects(tmp_path: Path) -> None:
     pytest.importorskip("onnx")
     from detector.discs import require_objects, save_disc_model
 
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     detector = Detector(DetectorParams(), save_disc_model(tmp_path / "m.onnx", (CAMERA.height, CAMERA.width)))
     run_offline(records(2), replace(stages, detector=detector, segmenter=Segmenter()), INPUTS)
     for frame in chain.frames:
@@ -633,7 +633,7 @@ class InFrame:
 
 
 def test_depth_of_another_sensor_goes_to_the_segmenter_in_the_picture_of_colour() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     timing = tied(ASIDE, "rgb", "depth")
     run = run_offline(of_two_sensors(), replace(stages, detector=InFrame()), WITH_COLOUR, timing)
     assert run.frames == 3 and not run.dropped
@@ -649,14 +649,14 @@ def test_depth_of_another_sensor_goes_to_the_segmenter_in_the_picture_of_colour(
     [(WITH_COLOUR, "/tf_static between the two frames, got"), (INPUTS, "and the camera_info of colour, got")],
 )
 def test_depth_that_cannot_be_registered_is_dropped_with_what_is_missing(inputs: Inputs, lacks: str) -> None:
-    stages, _ = simple_rooms()
+    stages, _ = simple_stages()
     run = run_offline(of_two_sensors(), replace(stages, detector=InFrame()), inputs)
     assert run.frames == 0 and run.dropped == {"malformed_depth": 3}
     assert lacks in run.complaints["malformed_depth"] and "'rgb'" in run.complaints["malformed_depth"]
 
 
 def test_a_cloud_of_a_body_is_turned_into_the_frame_of_the_picture() -> None:
-    stages, chain = simple_rooms()
+    stages, chain = simple_stages()
     xyz = back_project(np.full((48, 64), 2.0, np.float32), CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
     R_body_optical = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
     rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])

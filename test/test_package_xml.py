@@ -21,7 +21,7 @@ RELEASED_IN_JAZZY = {
     "vision_msgs", "visualization_msgs",
 }  # fmt: skip
 BUILDS_MESSAGES = {"ament_cmake", "rosidl_default_generators", "rosidl_default_runtime"}  # released in Jazzy too
-HERE = {"objreg_msgs"}  # in this repository: rosdep and colcon are told of its folder
+HERE = {"objreg_msgs"}  # in this repository: rosdep and colcon are given its folder
 IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, or one of PyPI
     "g++-static": "g++ 13.2.0",
     "python3-click": "python3-click 8.1.6",
@@ -61,8 +61,8 @@ def asked(repository: Path, keyword: str) -> Any:
 
 def required(repository: Path, *extras: str) -> dict[str, str]:
     """The packages that setup.py asks for, those of the extras too, each with its oldest version."""
-    told = asked(repository, "extras_require")
-    wanted = [*asked(repository, "install_requires"), *(line for extra in extras for line in told[extra])]
+    extra_lines = asked(repository, "extras_require")
+    wanted = [*asked(repository, "install_requires"), *(line for extra in extras for line in extra_lines[extra])]
     return {name: oldest for name, _, oldest in (line.partition(">=") for line in wanted) if name != "setuptools"}
 
 

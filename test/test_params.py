@@ -28,14 +28,14 @@ def test_defaults_hold_and_are_frozen() -> None:
         oven.heat = 1.0  # type: ignore[misc]
 
 
-def test_a_declaration_tells_everything_once() -> None:
+def test_a_declaration_states_everything_once() -> None:
     heat, trays, mode, *_, cold = OvenParams.declarations()
     assert (heat.name, heat.kind, heat.unit, heat.doc, heat.live) == ("heat", float, "°C", "how hot", True)
     assert (heat.range_text, trays.range_text, mode.range_text) == ("0 … 250", "at least 1", "air | grill")
     assert cold.range_text == "at most 0" and not cold.live
 
 
-def test_lists_are_told_apart_from_single_values() -> None:
+def test_lists_are_distinguished_from_single_values() -> None:
     kinds = {d.name: (d.kind, d.many) for d in OvenParams.declarations()}
     assert kinds["marks"] == (float, True) and kinds["names"] == (str, True) and kinds["trays"] == (int, False)
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from bridge.trees import said, transform
 from recording.sample_folders import CAMERA
-from simple_rooms import OneBox, OneCloud
+from simple_stages import OneBox, OneCloud
 
 from objreg_ros.bridge.camera.colour_frame import Cameras
 from objreg_ros.bridge.camera.frames import FrameTree

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tells of the release is of one version, and the forms around the project are what a host takes."""
+"""What states the release is of one version, and the forms around the project are what a host takes."""
 
 from __future__ import annotations
 
@@ -59,21 +59,21 @@ def test_both_packages_have_the_same_licence_file(repository: Path) -> None:
 
 def test_a_form_for_issues_asks_what_a_host_can_show(repository: Path) -> None:
     for form in FORMS:
-        told = loaded(repository / f".github/ISSUE_TEMPLATE/{form}.yml")
-        assert told["name"] and told["description"], form
-        asked = [field for field in told["body"] if field["type"] != "markdown"]
-        assert {field["type"] for field in told["body"]} <= FIELDS and asked, form
+        issue_form = loaded(repository / f".github/ISSUE_TEMPLATE/{form}.yml")
+        assert issue_form["name"] and issue_form["description"], form
+        asked = [field for field in issue_form["body"] if field["type"] != "markdown"]
+        assert {field["type"] for field in issue_form["body"]} <= FIELDS and asked, form
         assert len({field["id"] for field in asked}) == len(asked), form
         assert all(field["attributes"]["label"] for field in asked), form
         assert any(field.get("validations", {}).get("required") for field in asked), form
 
 
 def test_the_devcontainer_is_a_stage_of_the_image_for_python(repository: Path) -> None:
-    told = json.loads((repository / ".devcontainer/devcontainer.json").read_text())
-    dockerfile = (repository / ".devcontainer" / told["build"]["dockerfile"]).resolve()
-    assert f" AS {told['build']['target']}\n" in dockerfile.read_text()
-    assert f"useradd --create-home --uid 1000 {told['remoteUser']}\n" in dockerfile.read_text()
-    assert (repository / told["postCreateCommand"].split()[0]).is_file()
+    settings = json.loads((repository / ".devcontainer/devcontainer.json").read_text())
+    dockerfile = (repository / ".devcontainer" / settings["build"]["dockerfile"]).resolve()
+    assert f" AS {settings['build']['target']}\n" in dockerfile.read_text()
+    assert f"useradd --create-home --uid 1000 {settings['remoteUser']}\n" in dockerfile.read_text()
+    assert (repository / settings["postCreateCommand"].split()[0]).is_file()
 
 
 def test_the_badges_are_files_of_this_repository_and_say_what_the_package_says(repository: Path) -> None:

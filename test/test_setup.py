@@ -40,15 +40,15 @@ def wheel(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in FOLDERS:
         shutil.copytree(repository / name, source / name, ignore=shutil.ignore_patterns(*LEFT_OUT))
     words = ("wheel", "--no-deps", "--no-build-isolation", "--no-cache-dir", "--disable-pip-version-check")
-    told(sys.executable, "-m", "pip", *words, "--wheel-dir", str(out), str(source))
+    output_of(sys.executable, "-m", "pip", *words, "--wheel-dir", str(out), str(source))
     (made,) = out.glob("*.whl")
     return made
 
 
-def told(*words: str, cwd: Path | None = None) -> str:
-    """What a command says, which knows nothing of the checkout."""
+def output_of(*command: str, cwd: Path | None = None) -> str:
+    """The output of a command, which knows nothing of the checkout."""
     outside = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    done = subprocess.run(words, cwd=cwd, env=outside, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, cwd=cwd, env=outside, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -96,9 +96,9 @@ def test_the_wheel_runs_in_a_venv_that_has_only_it_and_what_it_asks_for(wheel: P
     venv.create(tmp_path / "venv", symlinks=True)
     binaries, (packages,) = tmp_path / "venv/bin", list((tmp_path / "venv/lib").glob("*/site-packages"))
     words = ("install", "--no-deps", "--no-index", "--no-compile", "--disable-pip-version-check", str(wheel))
-    told(sys.executable, "-m", "pip", "--python", str(binaries / "python"), *words)
+    output_of(sys.executable, "-m", "pip", "--python", str(binaries / "python"), *words)
     (packages / "asked_for.pth").write_text(f"{Path(numpy.__file__).parents[1]}\n")
-    assert "offline" in told(str(binaries / "objreg"), "--help", cwd=tmp_path)
-    home, *shared = told(str(binaries / "python"), "-c", RUN, cwd=tmp_path).split()
+    assert "offline" in output_of(str(binaries / "objreg"), "--help", cwd=tmp_path)
+    home, *shared = output_of(str(binaries / "python"), "-c", RUN, cwd=tmp_path).split()
     assert Path(home) == packages / "objreg_ros"
     assert len(shared) == 2 and all(Path(path).is_relative_to(tmp_path / "venv/share") for path in shared)

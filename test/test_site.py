@@ -33,8 +33,8 @@ def build(config: Path, out: Path) -> subprocess.CompletedProcess[str]:
 def site(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the built site."""
     out = tmp_path_factory.mktemp("site")
-    told = build(repository / "mkdocs.yml", out)
-    assert told.returncode == 0, told.stderr
+    done = build(repository / "mkdocs.yml", out)
+    assert done.returncode == 0, done.stderr
     return out
 
 
@@ -74,9 +74,9 @@ def test_a_link_that_leads_nowhere_ends_the_build(repository: Path, tmp_path: Pa
     assert validation is not None
     config = tmp_path / "mkdocs.yml"
     config.write_text(f"site_name: none\n{validation[0]}nav: [index.md]\n")
-    told = build(config, tmp_path / "out")
-    assert told.returncode != 0 and "#nowhere" in told.stderr and "gone.md" in told.stderr
-    assert "#a-page" not in told.stderr
+    done = build(config, tmp_path / "out")
+    assert done.returncode != 0 and "#nowhere" in done.stderr and "gone.md" in done.stderr
+    assert "#a-page" not in done.stderr
 
 
 def test_the_search_finds_pages_that_are_read_without_a_server_and_no_table_is_wider_than_a_telephone(

@@ -33,7 +33,7 @@ def test_the_truth_between_two_moments_is_the_relative_pose() -> None:
     assert truth.error(closure(T_from_to)) == pytest.approx((0, 0), abs=1e-6)
 
 
-def test_an_error_is_told_in_degrees_and_centimetres() -> None:
+def test_an_error_is_given_in_degrees_and_centimetres() -> None:
     truth = Truth([(0, at(0)), (100 * MS, at(1))])
     assert truth.error(closure(at(1.02, np.radians(2)))) == pytest.approx((2, 2))
 
@@ -65,7 +65,7 @@ def test_a_constraint_of_one_robot_is_judged_by_its_own_path() -> None:
     assert of_two().error(tie(at(0.02), "b", "b")) == pytest.approx((0, 2), abs=1e-6)
 
 
-def test_between_robots_the_truth_tells_nothing_beyond_either_path() -> None:
+def test_between_robots_the_truth_gives_nothing_beyond_either_path() -> None:
     late = tie(at(1), "a", "b", to_ns=900 * MS)
     assert of_two().error(late) is None and of_two().errors([late, tie(at(1), "a", "a")]) == [pytest.approx((0, 0))]
 
@@ -75,7 +75,7 @@ def test_a_robot_without_a_truth_is_refused_by_its_name() -> None:
         of_two().error(closure(at(1)))
 
 
-def test_errors_are_of_the_closures_that_the_truth_tells_of() -> None:
+def test_errors_are_of_the_closures_that_the_truth_covers() -> None:
     truth = Truth([(0, at(0)), (100 * MS, at(1))])
     assert truth.errors([closure(at(1)), closure(at(1), to_ns=900 * MS)]) == [pytest.approx((0, 0), abs=1e-6)]
 
@@ -92,13 +92,13 @@ def test_over_more_than_the_longest_gap_the_truth_is_not_interpolated() -> None:
 
 
 @pytest.mark.parametrize("stamp_ms", [-1, 101, 250, 401])
-def test_where_the_truth_does_not_tell_there_is_no_error(stamp_ms: int) -> None:
+def test_where_the_truth_says_nothing_there_is_no_error(stamp_ms: int) -> None:
     truth = Truth([(0, at(0)), (100 * MS, at(1)), (400 * MS, at(2))])
     assert truth.at(stamp_ms * MS) is None
     assert truth.error(closure(at(0), 0, stamp_ms * MS)) is None
 
 
-def test_a_truth_without_poses_tells_nothing() -> None:
+def test_a_truth_without_poses_gives_nothing() -> None:
     assert Truth([]).error(closure(at(0))) is None
 
 
@@ -133,15 +133,15 @@ def test_a_truth_in_order_has_no_note() -> None:
 
 
 def test_a_dropout_of_the_truth_is_passed_over_and_counted(tmp_path: Path) -> None:
-    told = [Record.of("/gt", messages.pose_stamped(at(i), i * 50 * MS, "world"), i * 50 * MS) for i in range(4)]
-    write_rosbag2(tmp_path / "bag", [told[0], lost(told[1]), lost(told[2], float("nan")), told[3]])
+    records = [Record.of("/gt", messages.pose_stamped(at(i), i * 50 * MS, "world"), i * 50 * MS) for i in range(4)]
+    write_rosbag2(tmp_path / "bag", [records[0], lost(records[1]), lost(records[2], float("nan")), records[3]])
     with open_recording(tmp_path / "bag") as recording:
         truth = Truth.of(recording, "/gt")
     assert truth.stamps_ns == [0, 150 * MS]
     assert len(truth.notes) == 1 and "2 of 4 poses of the ground truth /gt are none" in truth.notes[0]
 
 
-def test_the_length_of_the_way_is_told() -> None:
+def test_the_length_of_the_path_is_known() -> None:
     assert Truth([(0, at(0)), (1, at(1)), (2, at(-0.5))]).length == pytest.approx(2.5)
     assert Truth([]).length == 0
 

@@ -91,9 +91,9 @@ def test_a_pipe_is_written_into(tmp_path: Path) -> None:
     os.mkfifo(pipe)
     reader = threading.Thread(target=lambda: received.append(pipe.read_text()))
     reader.start()
-    write_whole(pipe, "told")
+    write_whole(pipe, "written")
     reader.join(5)
-    assert received == ["told"] and names(tmp_path) == ["pipe"]
+    assert received == ["written"] and names(tmp_path) == ["pipe"]
 
 
 def test_links_in_a_circle_are_named_and_stay(tmp_path: Path) -> None:

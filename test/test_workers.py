@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Work that is spread over processes: every item's end is told, whatever becomes of the process."""
+"""Work that is spread over processes: every item's end is reported, whatever becomes of the process."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def test_no_item_needs_no_worker() -> None:
     assert list(spread(halve, [], scheduler="tcp://nowhere:1")) == []
 
 
-def test_two_workers_tell_of_every_item_and_an_error_stops_no_other() -> None:
-    told = {done.item: done for done in spread(halve, [2, 3, 4, 6], workers=2)}
-    assert {item: done.value for item, done in told.items()} == {2: 1, 3: None, 4: 2, 6: 3}
+def test_two_workers_report_every_item_and_an_error_stops_no_other() -> None:
+    done_items = {done.item: done for done in spread(halve, [2, 3, 4, 6], workers=2)}
+    assert {item: done.value for item, done in done_items.items()} == {2: 1, 3: None, 4: 2, 6: 3}
     with pytest.raises(ValueError, match="expected an even number, got 3"):
-        told[3].result()
+        done_items[3].result()
 
 
 def test_an_error_comes_back_whatever_is_behind_it() -> None:
@@ -65,8 +65,8 @@ def test_an_error_comes_back_whatever_is_behind_it() -> None:
 def test_a_worker_that_is_killed_costs_its_item_alone_and_one_that_kills_all_is_given_up(tmp_path: Path) -> None:
     once, ever = tmp_path / "once", tmp_path / "ever"
     once.mkdir(), ever.mkdir()
-    told = sorted(done.result() for done in spread(partial(die, once, 1), [0, 1, 2], workers=2))
-    assert told == [0, 1, 2] and len(list(once.iterdir())) == 1
+    results = sorted(done.result() for done in spread(partial(die, once, 1), [0, 1, 2], workers=2))
+    assert results == [0, 1, 2] and len(list(once.iterdir())) == 1
     given_up = {done.item: done for done in spread(partial(die, ever, LIVES), [0, 1, 2], workers=1)}
     assert [given_up[item].value for item in (0, 1, 2)] == [0, None, 2]
     assert f"{LIVES} workers died at it" in str(given_up[1].error) and len(list(ever.iterdir())) == LIVES
@@ -74,8 +74,8 @@ def test_a_worker_that_is_killed_costs_its_item_alone_and_one_that_kills_all_is_
 
 def test_any_cluster_is_taken_by_its_address() -> None:
     with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
-        told = spread(os.path.basename, ["a/b"], scheduler=cluster.scheduler_address)
-        assert [done.result() for done in told] == ["b"]
+        finished = spread(os.path.basename, ["a/b"], scheduler=cluster.scheduler_address)
+        assert [done.result() for done in finished] == ["b"]
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

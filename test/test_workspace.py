@@ -52,16 +52,18 @@ def workspace_with_messages(workspace: Path) -> Path:
     return workspace
 
 
-def told(workspace: Path, *words: str) -> str:
+def output_of(workspace: Path, *command: str) -> str:
     outside = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "OBJREG_CHECKED"}}
-    done = subprocess.run(words, cwd=workspace, env=outside, capture_output=True, text=True, timeout=MOST_S)
+    done = subprocess.run(command, cwd=workspace, env=outside, capture_output=True, text=True, timeout=MOST_S)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
 def printed_after_setup(workspace: Path, program: str) -> Path:
     """The path that a program prints where the install space is sourced."""
-    return Path(told(workspace, "bash", "-c", f". install/setup.bash && {sys.executable} -c '{program}'").split()[-1])
+    return Path(
+        output_of(workspace, "bash", "-c", f". install/setup.bash && {sys.executable} -c '{program}'").split()[-1]
+    )
 
 
 def assert_kernels_are_of(workspace: Path, linked: bool) -> None:
@@ -76,8 +78,8 @@ def assert_kernels_are_of(workspace: Path, linked: bool) -> None:
 def test_a_clean_workspace_builds_both_packages(workspace_with_messages: Path, how: tuple[str, ...]) -> None:
     workspace = workspace_with_messages
     paths = ("--base-paths", "src/objreg_ros", "src/objreg_ros/objreg_msgs")
-    assert told(workspace, "colcon", "list", "--names-only", *paths).split() == ["objreg_msgs", "objreg_ros"]
-    told(workspace, "colcon", "build", *how, *paths)
+    assert output_of(workspace, "colcon", "list", "--names-only", *paths).split() == ["objreg_msgs", "objreg_ros"]
+    output_of(workspace, "colcon", "build", *how, *paths)
     assert printed_after_setup(workspace, MESSAGES).is_relative_to(workspace / "install")
     assert_kernels_are_of(workspace, linked=bool(how))
 
@@ -85,7 +87,7 @@ def test_a_clean_workspace_builds_both_packages(workspace_with_messages: Path, h
 @pytest.mark.slow
 @BOTH
 def test_a_clean_workspace_builds_the_nodes_without_the_messages(workspace: Path, how: tuple[str, ...]) -> None:
-    told(workspace, "colcon", "build", *how, "--base-paths", "src", "--packages-select", "objreg_ros")
+    output_of(workspace, "colcon", "build", *how, "--base-paths", "src", "--packages-select", "objreg_ros")
     assert (workspace / "install/objreg_ros/share/objreg_ros/package.xml").exists()
     assert_kernels_are_of(workspace, linked=bool(how))
 
@@ -94,18 +96,18 @@ def test_a_header_that_is_gone_is_gone_from_the_next_build(tmp_path: Path, repos
     old, kept = (tmp_path / f"objreg_ros/native/{name}" for name in ("gone.hpp", "array.hpp"))
     old.parent.mkdir(parents=True)
     old.touch()
-    told(repository, sys.executable, "setup.py", "--quiet", "build_py", "--build-lib", str(tmp_path))
+    output_of(repository, sys.executable, "setup.py", "--quiet", "build_py", "--build-lib", str(tmp_path))
     assert kept.exists() and not old.exists()
 
 
 def test_setup_runs_beside_a_link_to_it_as_colcon_makes_one(tmp_path: Path, repository: Path) -> None:
     (tmp_path / "setup.py").symlink_to(repository / "setup.py")
-    shown = told(tmp_path, sys.executable, "setup.py", "--name")
+    shown = output_of(tmp_path, sys.executable, "setup.py", "--name")
     assert shown.split()[-1] == "objreg_ros"
 
 
 def test_no_other_package_is_found_where_only_one_path_is_named(workspace: Path) -> None:
-    found = told(workspace, "colcon", "list", "--names-only", "--base-paths", "src").split()
+    found = output_of(workspace, "colcon", "list", "--names-only", "--base-paths", "src").split()
     assert found == ["objreg_ros"]  # why README names both
 
 

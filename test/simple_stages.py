@@ -44,7 +44,7 @@ class OneCloud:
     sensor = SensorEstimate()
 
     def __init__(self) -> None:
-        self.heard_sigma_deg: list[float | None] = []
+        self.received_sigma_deg: list[float | None] = []
 
     def segment(
         self,
@@ -54,7 +54,7 @@ class OneCloud:
         *,
         gravity_sigma_deg: float | None = None,
     ) -> Frame:
-        self.heard_sigma_deg.append(gravity_sigma_deg)
+        self.received_sigma_deg.append(gravity_sigma_deg)
         cloud = ObjectCloud(
             label=detections.label[0],
             score=0.1,
@@ -116,6 +116,6 @@ class Chain:
         return Outcome()
 
 
-def simple_rooms() -> tuple[Stages, Chain]:
+def simple_stages() -> tuple[Stages, Chain]:
     chain = Chain()
     return Stages(OneBox(), OneCloud(), chain), chain
