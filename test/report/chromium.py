@@ -13,8 +13,8 @@ import pytest
 
 
 @contextmanager
-def chromium(*words: str) -> Iterator[Any]:
-    """Chromium without a window, which keeps what its console says, with more words of its command line."""
+def chromium(*arguments: str) -> Iterator[Any]:
+    """Chromium without a window, which keeps what its console says, with more arguments on its command line."""
     webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
     program, driver = (shutil.which(name) for name in ("chromium", "chromedriver"))
     if program is None or driver is None:
@@ -22,8 +22,8 @@ def chromium(*words: str) -> Iterator[Any]:
     options = webdriver.ChromeOptions()
     options.binary_location = program
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", *words):
-        options.add_argument(word)
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", *arguments):
+        options.add_argument(argument)
     opened = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
     try:
         yield opened

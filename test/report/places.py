@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small stores for the tests of what is told of one."""
+"""Small stores for the tests of what is reported of one."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def cup_and_book(file: Path) -> Path:
     return store_of(file, [(10.0, 0, objects), (20.0, 0, objects), (30.0, 1, objects)])
 
 
-def told(from_s: float, to_s: float, label: str = "cup", metres: float = 0.4) -> LoopClosure:
-    """A closure of two moments at one place, which tells that something went so far."""
+def closure_of_move(from_s: float, to_s: float, label: str = "cup", metres: float = 0.4) -> LoopClosure:
+    """A closure of two moments at one place, which states that something went so far."""
     return LoopClosure(
         from_ns=round(from_s * SECOND),
         to_ns=round(to_s * SECOND),

@@ -77,18 +77,18 @@ def summary(false: bool = False) -> dict[str, Any]:
 
 def tracked(begins: int = 0) -> dict[str, Any]:
     """The walk without odometry: our own tracking has it, lost at frame ``begins`` and begun anew there, if not 0."""
-    told = summary()
+    run = summary()
     poses = odometry()
-    for k, row in enumerate(told["glimpses"]):
+    for k, row in enumerate(run["glimpses"]):
         first = begins if k >= begins else 0
         T = inverse(poses[first]) @ poses[k]
         row |= {"T_odom_camera": None, "tracked": {"session": int(k >= begins > 0), "T_session_camera": T.tolist()}}
-    return {**told, "odometry": "tracked"}
+    return {**run, "odometry": "tracked"}
 
 
 def with_a_stray(stamp_ns: int) -> dict[str, Any]:
     """The walk with a frame of another time before it, whose label nothing else has, and with a refusal of then."""
-    told = summary()
-    stray = {**told["glimpses"][0], "stamp_ns": stamp_ns, "labels": ["ghost"]}
+    run = summary()
+    stray = {**run["glimpses"][0], "stamp_ns": stamp_ns, "labels": ["ghost"]}
     refused = {**refusal("low_overlap", 0, 0), "from_ns": stamp_ns, "to_ns": stamp_ns}
-    return {**told, "glimpses": [stray, *told["glimpses"]], "refusals": [*told["refusals"], refused]}
+    return {**run, "glimpses": [stray, *run["glimpses"]], "refusals": [*run["refusals"], refused]}

@@ -134,9 +134,11 @@ def test_what_was_lost_between_two_runs_opens_in_its_own(browser: Any) -> None:
 def in_space(browser: Any, place: str) -> dict[str, Any]:
     """What is drawn in 3D at a place once it is there: the names of what the legend has, and points a trace."""
     until = f"const plot = () => document.querySelector('{place} .plot'), done = arguments[0];"
-    told = "const traces = plot().data; done({names: traces.map((t) => t.name), counts: traces.map((t) => t.x.length)})"
+    answer = (
+        "const traces = plot().data; done({names: traces.map((t) => t.name), counts: traces.map((t) => t.x.length)})"
+    )
     look = (
-        f"plot()?._fullLayout?.scene?._scene && !plot().hidden ? setTimeout(() => {{ {told} }}) : setTimeout(see, 20)"
+        f"plot()?._fullLayout?.scene?._scene && !plot().hidden ? setTimeout(() => {{ {answer} }}) : setTimeout(see, 20)"
     )
     return dict(browser.execute_async_script(f"{until} (function see() {{ {look} }})()"))
 
@@ -157,7 +159,7 @@ def test_the_way_and_both_clouds_of_a_pair_can_be_turned_about_once_one_asks(bro
 def test_nothing_is_wider_than_a_telephone_and_nothing_went_wrong(browser: Any) -> None:
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", TELEPHONE)
     assert browser.execute_script("return document.documentElement.scrollWidth") <= TELEPHONE["width"]
-    size = "const word = document.querySelector('.narrow svg text'), box = word.ownerSVGElement;"
+    size = "const label = document.querySelector('.narrow svg text'), box = label.ownerSVGElement;"
     letter = browser.execute_script(f"{size} return 12 * box.clientWidth / box.viewBox.baseVal.width")
     assert letter >= 10, "letters of a drawing in px"
     assert [row for row in browser.get_log("browser") if ADVICE not in row["message"]] == []

@@ -12,10 +12,10 @@ import numpy as np
 from objreg_tools.report.packed import packed, zipped
 
 
-def unpacked(told: dict[str, Any]) -> np.ndarray:
+def unpacked(cloud: dict[str, Any]) -> np.ndarray:
     """As templates/space.js does."""
-    steps = np.frombuffer(base64.b64decode(told["xyz"]), "<u2").reshape(3, -1).T
-    return np.array(told["low"]) + told["step"] * steps
+    steps = np.frombuffer(base64.b64decode(cloud["xyz"]), "<u2").reshape(3, -1).T
+    return np.array(cloud["low"]) + cloud["step"] * steps
 
 
 def unzipped(text: str) -> bytes:
@@ -25,9 +25,9 @@ def unzipped(text: str) -> bytes:
 
 def test_points_come_back_to_half_a_step() -> None:
     xyz = np.random.default_rng(0).uniform((-1, 0, 5), (1, 20, 6), (500, 3))
-    told = packed(xyz)
-    assert told["step"] < 20 / 65000 and np.abs(unpacked(told) - xyz).max() <= 0.501 * told["step"]
-    assert len(told["xyz"]) == 500 * 8
+    cloud = packed(xyz)
+    assert cloud["step"] < 20 / 65000 and np.abs(unpacked(cloud) - xyz).max() <= 0.501 * cloud["step"]
+    assert len(cloud["xyz"]) == 500 * 8
 
 
 def test_one_point_and_none_are_packed_too() -> None:

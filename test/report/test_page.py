@@ -58,7 +58,7 @@ def test_a_run_with_nothing_in_space_does_not_carry_what_draws_it() -> None:
     assert len(page([(RunSummary.of("empty", {"frames": 3, "constraints": []}, Truth([])), None)])) < 100_000
 
 
-def test_the_head_tells_of_false_constraints_and_of_the_error() -> None:
+def test_the_head_states_false_constraints_and_the_error() -> None:
     text = page([(RunSummary.of("walk", summary(false=True), TRUTH), None)])
     assert "1 of the 5 is false." in text and "better than odometry" in text
     assert "no truth to judge" in page([(RunSummary.of("walk", summary(), Truth([])), None)])
@@ -66,26 +66,26 @@ def test_the_head_tells_of_false_constraints_and_of_the_error() -> None:
 
 def test_the_head_counts_what_was_tried_apart_from_what_was_not() -> None:
     assert "2 candidates refused, 1 more not tried" in page([(RunSummary.of("walk", summary(), TRUTH), None)])
-    told = {**summary(), "rejected": {"texture_disagrees": 2}}
-    assert "2 candidates refused<" in page([(RunSummary.of("walk", told, TRUTH), None)])
+    run = {**summary(), "rejected": {"texture_disagrees": 2}}
+    assert "2 candidates refused<" in page([(RunSummary.of("walk", run, TRUTH), None)])
 
 
 def test_a_run_that_closed_nothing_says_so() -> None:
-    told = {"frames": 3, "constraints": []}
-    assert "No loop was closed" in page([(RunSummary.of("empty", told, Truth([])), None)])
+    run = {"frames": 3, "constraints": []}
+    assert "No loop was closed" in page([(RunSummary.of("empty", run, Truth([])), None)])
 
 
 def test_frames_that_are_left_out_are_counted() -> None:
-    told = summary()
-    assert "left out" not in page([(RunSummary.of("walk", told, TRUTH), None)])
-    told["glimpses"] += told["glimpses"][-2:]
-    assert " 2 frames are left out: their time is not later" in page([(RunSummary.of("walk", told, TRUTH), None)])
+    run = summary()
+    assert "left out" not in page([(RunSummary.of("walk", run, TRUTH), None)])
+    run["glimpses"] += run["glimpses"][-2:]
+    assert " 2 frames are left out: their time is not later" in page([(RunSummary.of("walk", run, TRUTH), None)])
 
 
 def test_closures_of_two_runs_of_the_clock_are_left_out_of_the_map_and_counted() -> None:
-    told = summary()
-    told["constraints"] += [closure(90, 30), closure(95, 35)]
-    text = page([(RunSummary.of("walk", told, TRUTH), None)])
+    run = summary()
+    run["constraints"] += [closure(90, 30), closure(95, 35)]
+    text = page([(RunSummary.of("walk", run, TRUTH), None)])
     assert "closed by 6 constraints" in text and " 2 closures are left out: they tie two runs of the clock" in text
     assert "two runs of the clock" not in page([(RunSummary.of("walk", summary(), TRUTH), None)])
 
@@ -117,8 +117,8 @@ def test_what_has_no_picture_is_counted_with_the_reason() -> None:
 
 
 def test_the_head_says_what_was_assumed_of_the_lens() -> None:
-    told = {**summary(), "lens": "plumb_bob, moves a pixel by 4.8 px (median), 36.8 at most; rectified"}
-    assert "Lens: plumb_bob, moves a pixel by 4.8 px" in page([(RunSummary.of("walk", told, TRUTH), None)])
+    run = {**summary(), "lens": "plumb_bob, moves a pixel by 4.8 px (median), 36.8 at most; rectified"}
+    assert "Lens: plumb_bob, moves a pixel by 4.8 px" in page([(RunSummary.of("walk", run, TRUTH), None)])
     assert "Lens:" not in page([(RunSummary.of("walk", summary(), TRUTH), None)])
 
 

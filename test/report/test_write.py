@@ -34,11 +34,11 @@ def test_the_recording_of_a_run_gives_truth_and_pictures(tmp_path: Path, shared:
     assert "<h1>redkitchen_a</h1>" in text and text.count("data:image/webp") >= 12
 
 
-def test_the_json_of_a_live_run_is_closed_by_the_odometry_of_its_recording(tmp_path: Path) -> None:
+def test_the_json_of_a_live_run_is_shown_by_the_odometry_of_its_recording(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", records(30))
     counters = {"published": 29, "stage_ms": {"segment": [3.0, 5.0]}}
-    told = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}, "nodes": {"segmenter": counters}}
-    (tmp_path / "demo.json").write_text(json.dumps(told))
+    run = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}, "nodes": {"segmenter": counters}}
+    (tmp_path / "demo.json").write_text(json.dumps(run))
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
     text = (tmp_path / "out.html").read_text()
     assert "the camera trajectory from above" in text and "segmenter: segment" in text
@@ -49,16 +49,16 @@ def test_frames_without_a_pose_get_that_of_the_odometry_at_their_time(tmp_path: 
     write_rosbag2(tmp_path / "bag", records(30))
     stamps = [record.stamp_ns for record in records(30) if record.topic == "/odom"]
     seen = [{"stamp_ns": stamp + 1_000_000, "labels": ["cup"], "objects": [["cup", [0, 0, 1]]]} for stamp in stamps]
-    told = {"recording": str(tmp_path / "bag"), "constraints": [], "glimpses": [*seen, {"stamp_ns": 5}]}
-    (tmp_path / "demo.json").write_text(json.dumps(told))
+    run = {"recording": str(tmp_path / "bag"), "constraints": [], "glimpses": [*seen, {"stamp_ns": 5}]}
+    (tmp_path / "demo.json").write_text(json.dumps(run))
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
     text = (tmp_path / "out.html").read_text()
     assert "Object map" in text and "cup, " in text
 
 
 def test_odometry_that_is_no_pose_is_passed_over(tmp_path: Path) -> None:
-    told = [lost(record) if record.topic == "/odom" and i < 9 else record for i, record in enumerate(records(30))]
-    write_rosbag2(tmp_path / "bag", told)
+    some_lost = [lost(record) if record.topic == "/odom" and i < 9 else record for i, record in enumerate(records(30))]
+    write_rosbag2(tmp_path / "bag", some_lost)
     run = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}}
     (tmp_path / "demo.json").write_text(json.dumps(run))
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
@@ -68,15 +68,15 @@ def test_odometry_that_is_no_pose_is_passed_over(tmp_path: Path) -> None:
 def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told: list[RunSummary] = []
-    monkeypatch.setattr("objreg_tools.report.write.page", lambda loaded, last: told.append(loaded[0][0]) or "")
+    shown: list[RunSummary] = []
+    monkeypatch.setattr("objreg_tools.report.write.page", lambda loaded, last: shown.append(loaded[0][0]) or "")
     write_rosbag2(tmp_path / "bag", records(3))
     rows = [{"stamp_ns": record.stamp_ns, "labels": [], "objects": []} for record in records(3)][::4]
     mounted = [0.3, 0.0, 1.1, -0.5, 0.5, -0.5, 0.5]  # looks ahead: optical z is the body's x
     run = {"recording": str(tmp_path / "bag"), "constraints": [], "glimpses": rows, "T_base_camera": mounted}
     (tmp_path / "demo.json").write_text(json.dumps(run))
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
-    for k, glimpse in enumerate(told[0].glimpses):
+    for k, glimpse in enumerate(shown[0].glimpses):
         metre_ahead = glimpse.T_odom_camera @ [0.0, 0.0, 1.0, 1.0]
         assert np.allclose(metre_ahead[:3], [0.1 * k + 0.3 + 1.0, 0.0, 1.1])
 
@@ -100,7 +100,7 @@ def test_the_pictures_are_of_the_inputs_that_the_run_took(tmp_path: Path, chosen
     assert chosen == [taken, taken] and "<h1>a walk</h1>" in (tmp_path / "out.html").read_text()
 
 
-def test_an_older_json_that_does_not_tell_its_inputs_is_shown_by_what_would_be_taken(
+def test_an_older_json_that_does_not_name_its_inputs_is_shown_by_what_would_be_taken(
     tmp_path: Path, chosen: list[Inputs]
 ) -> None:
     write_rosbag2(tmp_path / "bag", records(3))

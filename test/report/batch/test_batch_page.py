@@ -22,7 +22,7 @@ BLIND = Row("b", "/b", "b.json", frames=1, constraints=2, rejected={"slack": 4},
 GONE = Row("<c>", "/c", error="no such <file>")
 
 
-def test_sums_are_over_all_and_false_ones_where_truth_tells() -> None:
+def test_sums_are_over_all_and_false_ones_where_truth_is_known() -> None:
     summed = totals([GOOD, BLIND, GONE])
     assert (summed["recordings"], summed["failed"], summed["frames"], summed["constraints"], summed["false"]) == (
         3,

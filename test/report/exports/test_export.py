@@ -29,13 +29,13 @@ def test_points_far_from_the_origin_of_the_odometry_keep_their_places(tmp_path: 
     store = Store(tmp_path / "place.db")
     store.write_keyframe(taken, sightings_of(taken), [])
     store.close()
-    *files, told = export(tmp_path / "place.db", tmp_path / "out")
+    *files, map_file = export(tmp_path / "place.db", tmp_path / "out")
     kept = Store(tmp_path / "place.db", read_only=True).keyframe(1)
     for file, xyz in zip(files, (kept.objects[0].cloud.xyz, kept.context.xyz), strict=True):
         table = read_ply(file)
         offset_m = positions(table) - T_utm_camera[:3, 3]
         np.testing.assert_allclose(offset_m, xyz, atol=1e-6)
-    (landmark,) = json.loads(told.read_text())["landmarks"]
+    (landmark,) = json.loads(map_file.read_text())["landmarks"]
     np.testing.assert_allclose(landmark["position"] - T_utm_camera[:3, 3], kept.objects[0].centroid, atol=1e-6)
 
 
@@ -61,9 +61,12 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
         (7, "cell phone", 1)
     ]
     assert np.allclose(content["landmarks"][0]["position"], [5.0, 0.0, 1.0], atol=0.05)
-    (told,) = content["closures"]
+    (written,) = content["closures"]
     assert (
-        told["to_ns"] == 2 and told["from_frame_id"] == "camera" and told["from_robot"] == "" and told["objects"] == []
+        written["to_ns"] == 2
+        and written["from_frame_id"] == "camera"
+        and written["from_robot"] == ""
+        and written["objects"] == []
     )
 
 
@@ -95,13 +98,13 @@ def _damage(path: Path, table: str, column: str, number: int) -> None:
 @pytest.mark.parametrize(("table", "column"), [("scene", "view"), ("cloud", "points"), ("object", "position")])
 def test_a_damaged_keyframe_is_left_out_and_named(tmp_path: Path, table: str, column: str) -> None:
     _damage(_store_of(tmp_path / "place.db", "cup", "book", "can"), table, column, 2)
-    told: list[str] = []
-    *clouds, content = export(tmp_path / "place.db", tmp_path / "out", told.append)
+    notices: list[str] = []
+    *clouds, content = export(tmp_path / "place.db", tmp_path / "out", notices.append)
     assert len(clouds) == 4 and not any("000002" in file.name for file in clouds)
     kept = json.loads(content.read_text())
     assert [row["id"] for row in kept["keyframes"]] == [1, 3] and kept["damaged"] == [2]
     assert [row["label"] for row in kept["landmarks"]] == ["cup", "can"]
-    assert len(told) == 1 and told[0].startswith("keyframe 2 is left out: ")
+    assert len(notices) == 1 and notices[0].startswith("keyframe 2 is left out: ")
 
 
 @pytest.mark.parametrize("there", [False, True])

@@ -54,8 +54,8 @@ def taken(number: int, seconds: float, *objects: object, x: float | None = None)
 
 
 def test_the_trajectories_are_the_corrected_way_at_every_frame(walk: RunSummary, tmp_path: Path) -> None:
-    told: list[str] = []
-    MapFiles(tum=tmp_path / "way.tum", kitti=tmp_path / "way.kitti").write(walk, NOWHERE, told.append)
+    notices: list[str] = []
+    MapFiles(tum=tmp_path / "way.tum", kitti=tmp_path / "way.kitti").write(walk, NOWHERE, notices.append)
     tum, kitti = rows_of(tmp_path / "way.tum"), rows_of(tmp_path / "way.kitti").reshape(-1, 3, 4)
     assert tum[:, 0].tolist() == [k / 10 for k in range(COUNT)]
     np.testing.assert_allclose(kitti[:, :, 3], tum[:, 1:4], atol=1e-8)
@@ -64,7 +64,7 @@ def test_the_trajectories_are_the_corrected_way_at_every_frame(walk: RunSummary,
     end = TRUE[0] @ np.vstack([kitti[-1], [0, 0, 0, 1]])  # odometry began at the identity
     drifted = np.linalg.norm((TRUE[0] @ odometry[-1])[:3, 3] - TRUE[-1][:3, 3])
     assert np.linalg.norm(end[:3, 3] - TRUE[-1][:3, 3]) < 0.5 * drifted
-    assert told == [f"{tmp_path / name}: {COUNT} poses" for name in ("way.tum", "way.kitti")]
+    assert notices == [f"{tmp_path / name}: {COUNT} poses" for name in ("way.tum", "way.kitti")]
 
 
 def test_the_trajectory_before_it_was_corrected_and_the_true_one_have_the_same_stamps(
@@ -105,15 +105,15 @@ def test_the_graph_has_the_keyframes_and_what_ties_them_but_what_was_pruned(walk
 
 def test_the_cloud_is_what_the_keyframes_saw_at_their_corrected_places(tmp_path: Path) -> None:
     store = store_of(tmp_path / "place.db", taken(1, 0.0), taken(2, 3.0))
-    told: list[str] = []
-    MapFiles(cloud=tmp_path / "map.ply", voxel=0.07).write(straight(5), store, told.append)
+    notices: list[str] = []
+    MapFiles(cloud=tmp_path / "map.ply", voxel=0.07).write(straight(5), store, notices.append)
     table, seen = read_ply(tmp_path / "map.ply"), keyframe().view
     expected = np.concatenate([transform(moved(x), seen.xyz.reshape(-1, 3)) for x in (0.0, 3.0)])
     assert abs(len(table) - len(np.unique(np.floor(expected / 0.07), axis=0))) <= 2  # at the edge of a voxel
     np.testing.assert_allclose(positions(table).min(axis=0), expected.min(axis=0), atol=0.07)
     np.testing.assert_allclose(positions(table).max(axis=0), expected.max(axis=0), atol=0.07)
     assert np.array_equal(table["red"], table["blue"]) and table["red"].std() > 10
-    assert told == [f"{tmp_path / 'map.ply'}: {len(table)} points, one for each voxel of 7 cm"]
+    assert notices == [f"{tmp_path / 'map.ply'}: {len(table)} points, one for each voxel of 7 cm"]
 
 
 def test_a_map_that_is_bent_bends_its_cloud(tmp_path: Path) -> None:
@@ -149,13 +149,15 @@ def test_objects_keep_their_colours_in_a_grey_room(tmp_path: Path) -> None:
 
 def test_keyframes_of_another_run_in_the_same_store_are_left_out(tmp_path: Path) -> None:
     others = taken(2, 1.0, x=1.01), taken(3, 1.5), replace(taken(4, 1.0), by_odometry=False)
-    told: list[str] = []
-    MapFiles(cloud=tmp_path / "map.ply").write(straight(3), store_of(tmp_path / "a.db", taken(1, 1.0)), told.append)
+    notices: list[str] = []
+    MapFiles(cloud=tmp_path / "map.ply").write(straight(3), store_of(tmp_path / "a.db", taken(1, 1.0)), notices.append)
     MapFiles(cloud=tmp_path / "both.ply").write(
-        straight(3), store_of(tmp_path / "b.db", taken(1, 1.0), *others), told.append
+        straight(3), store_of(tmp_path / "b.db", taken(1, 1.0), *others), notices.append
     )
     assert (tmp_path / "map.ply").read_bytes() == (tmp_path / "both.ply").read_bytes()
-    assert told[1] == "3 keyframes of the store are not on the map: they are of another run, or not of the trajectory"
+    assert (
+        notices[1] == "3 keyframes of the store are not on the map: they are of another run, or not of the trajectory"
+    )
 
 
 def test_keyframes_of_our_own_tracking_are_on_its_map_and_those_of_odometry_are_not(tmp_path: Path) -> None:
@@ -164,23 +166,25 @@ def test_keyframes_of_our_own_tracking_are_on_its_map_and_those_of_odometry_are_
     ]
     run = RunSummary.of("straight", {"glimpses": rows, "constraints": [], "odometry": "tracked"}, Truth([]))
     store = store_of(tmp_path / "a.db", replace(taken(1, 1.0), by_odometry=False), taken(2, 2.0))
-    told: list[str] = []
-    MapFiles(tum=tmp_path / "way.tum", cloud=tmp_path / "map.ply").write(run, store, told.append)
-    assert told[1] == "1 keyframes of the store are not on the map: they are of another run, or not of the trajectory"
+    notices: list[str] = []
+    MapFiles(tum=tmp_path / "way.tum", cloud=tmp_path / "map.ply").write(run, store, notices.append)
+    assert (
+        notices[1] == "1 keyframes of the store are not on the map: they are of another run, or not of the trajectory"
+    )
     assert len(read_ply(tmp_path / "map.ply")) > 1000 and len(rows_of(tmp_path / "way.tum")) == 3
 
 
-def test_a_damaged_keyframe_is_left_out_and_told(tmp_path: Path) -> None:
+def test_a_damaged_keyframe_is_left_out_and_reported(tmp_path: Path) -> None:
     store = store_of(tmp_path / "place.db", taken(1, 0.0), taken(2, 1.0))
     with closing(sqlite3.connect(store)) as connection, connection:
         connection.execute("UPDATE scene SET view = x'00' WHERE id = 2")
-    told: list[str] = []
-    MapFiles(cloud=tmp_path / "map.ply").write(straight(2), store, told.append)
-    assert told[0].startswith("keyframe 2 is left out: ") and len(read_ply(tmp_path / "map.ply")) > 1000
+    notices: list[str] = []
+    MapFiles(cloud=tmp_path / "map.ply").write(straight(2), store, notices.append)
+    assert notices[0].startswith("keyframe 2 is left out: ") and len(read_ply(tmp_path / "map.ply")) > 1000
 
 
 def test_a_run_without_odometry_has_no_map(tmp_path: Path) -> None:
-    told = {"glimpses": [{"stamp_ns": 0}, {"stamp_ns": 1}], "constraints": []}
+    run = {"glimpses": [{"stamp_ns": 0}, {"stamp_ns": 1}], "constraints": []}
     with pytest.raises(ValueError, match="--tum: expected frames with odometry, got none of 2: there is no map"):
-        MapFiles(tum=tmp_path / "way.tum").write(RunSummary.of("blind", told, Truth([])), NOWHERE)
+        MapFiles(tum=tmp_path / "way.tum").write(RunSummary.of("blind", run, Truth([])), NOWHERE)
     assert not (tmp_path / "way.tum").exists()

@@ -44,10 +44,10 @@ def test_the_three_ways_are_paths(read: dict[str, list]) -> None:
 def test_closures_are_lines_by_verdict_with_their_errors_beside_them(read: dict[str, list]) -> None:
     (array,) = read["/closures"]
     lines = {marker.ns: len(marker.points) // 2 for marker in array.markers if marker.points}
-    words = [marker.text for marker in array.markers if marker.text]
+    texts = [marker.text for marker in array.markers if marker.text]
     edges = walk().edges
     assert lines == {v: sum(e.verdict == v for e in edges) for v in {edge.verdict for edge in edges}}
-    assert "false" in lines and words == [edge.text for edge in edges]
+    assert "false" in lines and texts == [edge.text for edge in edges]
 
 
 def test_objects_are_where_they_were_seen(read: dict[str, list]) -> None:
@@ -81,7 +81,7 @@ def test_the_camera_goes_through_the_map_with_what_it_saw(read: dict[str, list])
 
 
 def test_what_cannot_be_finished_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*words: object) -> None:
+    def full(*_: object) -> None:
         raise OSError("no space left")
 
     monkeypatch.setattr("objreg_tools.report.exports.mcap_file.write_rosbag2", full)

@@ -73,7 +73,7 @@ def test_the_camera_has_its_picture_and_its_cloud_at_each_moment(read: dict[str,
 
 
 def test_what_cannot_be_finished_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*words: object) -> None:
+    def full(*_: object) -> None:
         raise OSError("no space left")
 
     monkeypatch.setattr("objreg_ros.whole_file.os.replace", full)

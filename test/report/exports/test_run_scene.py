@@ -42,14 +42,14 @@ def test_moments_are_thinned_and_those_without_a_picture_are_passed_over() -> No
 
 
 def test_without_odometry_the_truth_is_shown() -> None:
-    told = summary()
-    told["glimpses"] = [{"stamp_ns": row["stamp_ns"]} for row in told["glimpses"]]
-    scene = scene_of(RunSummary.of("walk", told, TRUTH), FewPictures())  # type: ignore[arg-type]
+    run = summary()
+    run["glimpses"] = [{"stamp_ns": row["stamp_ns"]} for row in run["glimpses"]]
+    scene = scene_of(RunSummary.of("walk", run, TRUTH), FewPictures())  # type: ignore[arg-type]
     assert list(scene.trajectories) == ["true"] and scene.objects == () and len(scene.edges) == 4
     assert np.allclose(scene.main.poses[7], TRUE[7])
 
 
 def test_a_run_of_which_nobody_knows_where_it_was_is_refused() -> None:
-    told = {"glimpses": [{"stamp_ns": 5}], "constraints": []}
+    run = {"glimpses": [{"stamp_ns": 5}], "constraints": []}
     with pytest.raises(ValueError, match="walk: expected odometry or a ground truth"):
-        scene_of(RunSummary.of("walk", told, Truth([])), FewPictures())  # type: ignore[arg-type]
+        scene_of(RunSummary.of("walk", run, Truth([])), FewPictures())  # type: ignore[arg-type]

@@ -12,12 +12,12 @@ from objreg_tools.report.exports.scene_files import SceneFiles
 from report.scenes import walk
 
 
-def test_only_what_is_asked_for_is_written_and_told(tmp_path: Path) -> None:
-    told: list[str] = []
+def test_only_what_is_asked_for_is_written_and_reported(tmp_path: Path) -> None:
+    notices: list[str] = []
     files = SceneFiles(mcap=tmp_path / "run.mcap")
-    files.write(walk(), told.append)
+    files.write(walk(), notices.append)
     assert files.wanted == {"--mcap": tmp_path / "run.mcap"} and [f.name for f in tmp_path.iterdir()] == ["run.mcap"]
-    (line,) = told
+    (line,) = notices
     assert "the trajectory (odometry, corrected, true), 5 closures, 3 frames with picture and cloud" in line
 
 

@@ -14,17 +14,17 @@ import pytest
 from objreg_tools.report.run.about import about, commit, version
 
 
-def test_a_run_tells_what_it_was_made_with(tmp_path: Path) -> None:
+def test_a_run_states_what_it_was_made_with(tmp_path: Path) -> None:
     (tmp_path / "cups.onnx").write_bytes(b"weights")
-    told = about(
+    made = about(
         tmp_path, str(tmp_path / "cups.onnx"), {"detector.threshold": 0.4}, ["offline", "my room", "--json", "x"]
     )
-    assert told["command"] == "objreg offline 'my room' --json x" and told["recording"] == str(tmp_path)
+    assert made["command"] == "objreg offline 'my room' --json x" and made["recording"] == str(tmp_path)
     digest = hashlib.sha256(b"weights").hexdigest()
-    assert told["model"] == {"name": "cups.onnx", "sha256": digest[:12], "threshold": 0.4}
+    assert made["model"] == {"name": "cups.onnx", "sha256": digest[:12], "threshold": 0.4}
     assert about(tmp_path, str(tmp_path / "cups.onnx"), {}, [])["model"]["threshold"] == 0.5
-    assert told["params"] == {"detector.threshold": 0.4} and json.loads(json.dumps(told)) == told
-    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", told["date"])
+    assert made["params"] == {"detector.threshold": 0.4} and json.loads(json.dumps(made)) == made
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", made["date"])
 
 
 def test_the_version_is_that_of_the_package() -> None:
@@ -32,8 +32,8 @@ def test_the_version_is_that_of_the_package() -> None:
     assert f"<version>{version()}</version>" in packaged.read_text()
 
 
-def git(folder: Path, *words: str) -> str:
-    asked = ["git", "-C", str(folder), "-c", "user.name=a", "-c", "user.email=a@b", *words]
+def git(folder: Path, *arguments: str) -> str:
+    asked = ["git", "-C", str(folder), "-c", "user.name=a", "-c", "user.email=a@b", *arguments]
     return subprocess.run(asked, check=True, capture_output=True, text=True).stdout
 
 

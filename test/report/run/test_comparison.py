@@ -11,18 +11,18 @@ from objreg_tools.report.run.run_summary import RunSummary
 from report.runs import TRUTH, closure, refusal, summary
 
 
-def told(params: dict[str, Any], **others: Any) -> RunSummary:
+def run_with(params: dict[str, Any], **others: Any) -> RunSummary:
     made = {"version": "0.1.0", "commit": "abc", "params": params, "date": "now", "model": {"name": "m", "sha256": "1"}}
     return RunSummary.of("walk", {**summary(), "about": made, **others}, TRUTH)
 
 
 def test_runs_are_named_by_what_differs_between_them() -> None:
-    names = names_of([told({}), told({"registrar.seed": 7, "detector.threshold": 0.4})])
+    names = names_of([run_with({}), run_with({"registrar.seed": 7, "detector.threshold": 0.4})])
     assert names == [
         "A: registrar.seed default, detector.threshold default",
         "B: registrar.seed 7, detector.threshold 0.4",
     ]
-    assert names_of([told({}), told({})])[1] == "B: walk, made as the others"
+    assert names_of([run_with({}), run_with({})])[1] == "B: walk, made as the others"
 
 
 def test_constraints_are_the_same_within_the_time_of_a_keyframe() -> None:
@@ -38,10 +38,10 @@ def test_a_constraint_is_matched_once_with_the_nearest() -> None:
     assert matched(run.closures, run.closures[1:]) == {1: 0}
 
 
-def test_what_was_gained_and_lost_is_told_with_what_became_of_it() -> None:
-    before = told({})
+def test_what_was_gained_and_lost_is_listed_with_what_became_of_it() -> None:
+    before = run_with({})
     rows = [closure(k, k + 60) for k in (5, 20, 40)]
-    after = told({}, constraints=[*rows, closure(10, 95)], refusals=[refusal("low_overlap", 54, 116)])
+    after = run_with({}, constraints=[*rows, closure(10, 95)], refusals=[refusal("low_overlap", 54, 116)])
     (change,) = comparison([before, after])["changes"]
     assert change["title"] == "B against A" and change["kept"] == 3
     ((gained,), (lost,)) = change["gained"], change["lost"]
@@ -51,13 +51,13 @@ def test_what_was_gained_and_lost_is_told_with_what_became_of_it() -> None:
 
 
 def test_runs_of_different_recordings_are_not_matched() -> None:
-    text = page([(told({}, recording="/a"), None), (told({}, recording="/b"), None)])
+    text = page([(run_with({}, recording="/a"), None), (run_with({}, recording="/b"), None)])
     assert "of different recordings" in text and "were gained" not in text
 
 
-def test_the_table_tells_errors_reasons_and_times_of_each() -> None:
+def test_the_table_states_errors_reasons_and_times_of_each() -> None:
     slow = {"detect": {"p50": 16.0, "p95": 20.0}}
-    table = dict(comparison([told({}), told({}, stage_ms=slow, rejected={"gravity_not_kept": 3})])["table"])
+    table = dict(comparison([run_with({}), run_with({}, stage_ms=slow, rejected={"gravity_not_kept": 3})])["table"])
     assert table["detect, median"] == ["8.0 ms", "16.0 ms"] and table["register, median"] == ["0.2 ms", "–"]
     assert table["gravity not kept"] == ["0", "3"] and table["false constraints"] == ["0 of 4", "0 of 4"]
     assert table["error before correction"][0].endswith(" cm")

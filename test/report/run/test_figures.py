@@ -14,7 +14,7 @@ from objreg_tools.report.run.run_summary import RunSummary
 from objreg_tools.truth import Truth
 from report.runs import STEP_NS, TRUE, TRUTH, closure, summary, with_a_stray
 
-STORY = RunSummary.of("walk", summary(false=True), TRUTH)
+RUN = RunSummary.of("walk", summary(false=True), TRUTH)
 
 
 def count(svg: str, style: str) -> int:
@@ -22,7 +22,7 @@ def count(svg: str, style: str) -> int:
 
 
 def test_the_way_shows_three_lines_and_a_link_a_closure() -> None:
-    svg = figures.trajectory(STORY, STORY.tracks().stamps_ns, STORY.tracks().lines)
+    svg = figures.trajectory(RUN, RUN.tracks().stamps_ns, RUN.tracks().lines)
     assert [count(svg, style) for style in ("true", "odometry", "corrected", "link", "false")] == [1, 1, 1, 5, 1]
     assert "off by 0.0° and 50.0 cm" in svg
 
@@ -35,26 +35,26 @@ def test_the_closures_of_a_run_without_odometry_are_drawn_on_the_true_way() -> N
 
 
 def test_a_drawing_for_a_telephone_has_letters_of_the_same_size_in_less_width() -> None:
-    wide, narrow = (figures.timeline(STORY, width) for width in (figures.WIDE, figures.NARROW))
+    wide, narrow = (figures.timeline(RUN, width) for width in (figures.WIDE, figures.NARROW))
     assert 'viewBox="0 0 1040 ' in wide and 'viewBox="0 0 400 ' in narrow
     assert max(float(x) for x in re.findall(r' cx="([^"]+)"', narrow)) <= 400
 
 
-def test_a_closure_tells_what_had_moved() -> None:
-    told = {**closure(0, 60), "evidence": {"score": 0.8, "moved soda_can [m]": 0.412}}
-    run = RunSummary.of("walk", {**summary(), "constraints": [told]}, TRUTH)
+def test_a_closure_states_what_had_moved() -> None:
+    of_move = {**closure(0, 60), "evidence": {"score": 0.8, "moved soda_can [m]": 0.412}}
+    run = RunSummary.of("walk", {**summary(), "constraints": [of_move]}, TRUTH)
     assert figures.closure_text(run, run.closures[0]).endswith(
         "cup, book, soda can moved by 0.41 m, off by 0.0° and 0.0 cm"
     )
 
 
 def test_the_error_has_two_lines_with_truth() -> None:
-    svg = figures.error_over_time(STORY, STORY.tracks())
+    svg = figures.error_over_time(RUN, RUN.tracks())
     assert count(svg, "odometry") == count(svg, "corrected") == 1
 
 
 def test_the_timeline_has_a_dot_a_refusal_and_a_row_a_reason() -> None:
-    svg = figures.timeline(STORY)
+    svg = figures.timeline(RUN)
     assert count(svg, "refused") == 3
     assert "texture disagrees" in svg and "no candidate" in svg
     assert count(svg, "seen") > 3  # the cups and the book come and go
@@ -74,12 +74,12 @@ def test_the_timeline_and_the_error_are_of_the_run_without_what_is_of_another_ti
 
 
 def test_the_map_names_every_object_once() -> None:
-    svg = figures.object_map(STORY, corrected=True)
+    svg = figures.object_map(RUN, corrected=True)
     names = [node.text for node in ElementTree.fromstring(svg) if node.get("class") == "name"]
     assert sorted(names) == ["book", "cup", "cup"]
 
 
-def test_heaps_of_one_label_are_told_apart_and_strays_have_no_name() -> None:
+def test_heaps_of_one_label_are_kept_apart_and_strays_have_no_name() -> None:
     xy = np.array([[0.0, 0.0]] * 5 + [[3.0, 0.0]] * 5 + [[9.0, 9.0]])
     assert [tuple(place) for _, place in figures.clusters(["cup"] * 11, xy)] == [(0.0, 0.0), (3.0, 0.0)]
 

@@ -53,9 +53,9 @@ def test_candidates_that_were_passed_over_are_no_sign_of_a_camera_that_did_not_c
     assert re.search(rf"^#+ `?{anchor.replace('-', ' ')}`?$", headings, re.MULTILINE)
 
 
-def test_what_was_dropped_is_told_with_the_first_complaint() -> None:
-    told = {**EMPTY, "frames": 0, "dropped": {"malformed_depth": 9}, "complaints": {"malformed_depth": "odd bytes"}}
-    (finding,) = find(told)
+def test_what_was_dropped_is_stated_with_the_first_complaint() -> None:
+    run = {**EMPTY, "frames": 0, "dropped": {"malformed_depth": 9}, "complaints": {"malformed_depth": "odd bytes"}}
+    (finding,) = find(run)
     assert "9 malformed_depth" in finding.what and "odd bytes" in finding.cause and "objreg inspect" in finding.todo
 
 
@@ -64,11 +64,11 @@ def test_refusals_are_counted_without_what_was_never_tried() -> None:
     assert finding.what == "all 7 candidates were refused: 5 gravity_not_kept, 2 low_overlap"
 
 
-def test_the_live_graph_is_closed_by_its_books_and_its_frames() -> None:
+def test_the_live_graph_is_judged_by_its_counters_and_its_frames() -> None:
     counters = {"published": 0, "received": 100, "dropped": {"overtaken": 50}}
     row = {"stamp_ns": 1, "labels": ["cup"], "objects": []}
-    told = {"nodes": {"segmenter": {**counters, "published": 3}}, "glimpses": [row], "constraints": []}
-    assert [finding.anchor for finding in find(told)] == ["no-objects", "overtaken"]
+    run = {"nodes": {"segmenter": {**counters, "published": 3}}, "glimpses": [row], "constraints": []}
+    assert [finding.anchor for finding in find(run)] == ["no-objects", "overtaken"]
 
 
 def test_few_overtaken_frames_are_usual_and_a_search_that_ended_early_is_not() -> None:
@@ -84,17 +84,17 @@ def test_few_overtaken_frames_are_usual_and_a_search_that_ended_early_is_not() -
      (None, {**CLOSED, "detections": 2}, True)],
 )  # fmt: skip
 def test_the_model_of_simulated_rooms_is_named_on_real_ones(simulated: bool | None, run: dict, said: bool) -> None:
-    told = find({**run, "model": "objreg_ssd.onnx", "simulated": simulated})
-    assert ("model-of-simulated-rooms" in [finding.anchor for finding in told]) is said
+    findings = find({**run, "model": "objreg_ssd.onnx", "simulated": simulated})
+    assert ("model-of-simulated-rooms" in [finding.anchor for finding in findings]) is said
 
 
 def test_a_recording_is_known_as_simulated_by_the_truth_beside_it(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", records())
     for path, simulated in ((tum_folder(tmp_path / "tum"), False), (tmp_path / "bag", None)):
         with open_recording(path) as source:
-            told = setting(source, choose_inputs(source.topics), "objreg_ssd.onnx")
+            found = setting(source, choose_inputs(source.topics), "objreg_ssd.onnx")
         of_pictures = {"pictures": True} if simulated is False else {}
-        assert told == {"model": "objreg_ssd.onnx", "simulated": simulated, **of_pictures}
+        assert found == {"model": "objreg_ssd.onnx", "simulated": simulated, **of_pictures}
 
 
 def test_of_a_folder_of_pictures_no_other_topic_is_to_be_taken() -> None:

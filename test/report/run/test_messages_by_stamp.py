@@ -18,10 +18,9 @@ from objreg_tools.report.run.messages_by_stamp import SLOP_NS, CamerasByStamp, M
 FIRST_NS = 10**9
 
 
-def recorded(path: Path, late_ns: int, told: Iterable[Record] | None = None) -> Path:
+def recorded(path: Path, late_ns: int) -> Path:
     """Recorded so much later than stamped."""
-    told = records(30) if told is None else told
-    write_rosbag2(path, [replace(record, stamp_ns=record.stamp_ns + late_ns) for record in told])
+    write_rosbag2(path, [replace(record, stamp_ns=record.stamp_ns + late_ns) for record in records(30)])
     return path
 
 
@@ -61,8 +60,8 @@ def info(stamp_ns: int, fx: float) -> Record:
 
 
 def test_the_camera_is_the_newest_calibrated_one_of_a_moment_or_else_the_first(tmp_path: Path) -> None:
-    told = [uncalibrated(1), info(20, 50.0), info(30, 50.0), info(40, 60.0), uncalibrated(50)]
-    write_rosbag2(tmp_path / "bag", told)
+    infos = [uncalibrated(1), info(20, 50.0), info(30, 50.0), info(40, 60.0), uncalibrated(50)]
+    write_rosbag2(tmp_path / "bag", infos)
     with open_recording(tmp_path / "bag") as recording:
         cameras = CamerasByStamp(recording, "/camera_info")
         found = [camera_from_msg.intrinsics(cameras.at(stamp)).fx for stamp in (5, 20, 39, 40, 99)]

@@ -11,18 +11,18 @@ from objreg_tools.report.run.run_summary import RunSummary
 from objreg_tools.truth import Truth
 from report.runs import STEP_NS, TRUTH, closure, refusal, summary
 
-STORY = RunSummary.of("walk", summary(false=True), TRUTH)
+RUN = RunSummary.of("walk", summary(false=True), TRUTH)
 
 
 def test_every_constraint_and_every_refusal_is_a_pair() -> None:
-    pairs = pairs_of(STORY)
+    pairs = pairs_of(RUN)
     assert [pair.key for pair in pairs] == ["c0", "c1", "c2", "c3", "c4", "r0", "r1", "r2"]
     assert [pair.verdict for pair in pairs] == [*["accepted"] * 4, "false", *["refused"] * 3]
     assert [pair.reason for pair in pairs[4:7]] == ["accepted", "no_candidate", "texture_disagrees"]
 
 
-def test_a_pair_tells_its_error_where_truth_does() -> None:
-    pair = pairs_of(STORY)[4]
+def test_a_pair_states_its_error_where_truth_is_known() -> None:
+    pair = pairs_of(RUN)[4]
     assert pair.error == pytest.approx((0.0, 50.0), abs=1e-4)
     assert "In truth 120° and 1.7 m apart; the pose is off by 0.0° and 50.0 cm." in pair.text
     unjudged = pairs_of(RunSummary.of("walk", summary(), Truth([])))[0]

@@ -85,9 +85,9 @@ def test_an_album_says_that_a_picture_does_not_decode_and_has_those_beside_it(tm
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_a_story_of_few_closures_shows_them_all(count: int) -> None:
-    told = {**summary(), "constraints": summary()["constraints"][:count]}
-    assert len(chosen_closures(RunSummary.of("walk", told, TRUTH))) == count
+def test_a_run_of_few_closures_shows_them_all(count: int) -> None:
+    run = {**summary(), "constraints": summary()["constraints"][:count]}
+    assert len(chosen_closures(RunSummary.of("walk", run, TRUTH))) == count
 
 
 def test_an_album_says_why_it_has_no_picture_of_a_moment(tmp_path: Path) -> None:
@@ -103,16 +103,18 @@ def test_an_album_says_why_it_has_no_picture_of_a_moment(tmp_path: Path) -> None
 
 
 def test_a_picture_that_cannot_be_read_is_none_and_said(tmp_path: Path) -> None:
-    told = [uncalibrated(r.stamp_ns) if r.topic == "/camera_info" else r for r in records(3)]
-    write_rosbag2(tmp_path / "bag", told)
+    uncalibrated_records = [uncalibrated(r.stamp_ns) if r.topic == "/camera_info" else r for r in records(3)]
+    write_rosbag2(tmp_path / "bag", uncalibrated_records)
     with open_recording(tmp_path / "bag") as recording:
         album = Album(recording, choose_inputs(recording.topics))
         assert album.at(10**9) is None and "expected a calibrated camera_info, got none" in album.lacking(10**9)
 
 
 def test_an_album_waits_for_the_first_calibrated_camera(tmp_path: Path) -> None:
-    told = [uncalibrated(r.stamp_ns) if r.topic == "/camera_info" and r.stamp_ns == 10**9 else r for r in records(3)]
-    write_rosbag2(tmp_path / "bag", told)
+    late_camera = [
+        uncalibrated(r.stamp_ns) if r.topic == "/camera_info" and r.stamp_ns == 10**9 else r for r in records(3)
+    ]
+    write_rosbag2(tmp_path / "bag", late_camera)
     with open_recording(tmp_path / "bag") as recording:
         assert Album(recording, choose_inputs(recording.topics)).at(10**9) is not None
 
@@ -122,8 +124,8 @@ def test_a_cloud_has_its_own_colour_and_needs_no_calibrated_camera(tmp_path: Pat
     v, u = np.mgrid[:48, :64]
     rows = np.zeros((48, 64), VIEW if coloured else [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     rows["x"], rows["y"], rows["z"] = (u - 31.5) / 50.0, (v - 23.5) / 50.0, 1.0
-    told = [uncalibrated(5), Record.of("/points", messages.point_cloud(rows, 5, "camera"), 10**12)]
-    write_rosbag2(tmp_path / "bag", told)
+    camera_and_cloud = [uncalibrated(5), Record.of("/points", messages.point_cloud(rows, 5, "camera"), 10**12)]
+    write_rosbag2(tmp_path / "bag", camera_and_cloud)
     with open_recording(tmp_path / "bag") as recording:
         album = Album(recording, Inputs(points="/points", camera_info="/camera_info"))
         assert (album.at(5) is not None) == coloured

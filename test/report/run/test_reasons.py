@@ -38,9 +38,9 @@ def test_every_drop_has_its_meaning(repository: Path) -> None:
 
 def test_a_reason_says_what_to_do_and_names_parameters_and_limits_that_exist(repository: Path) -> None:
     for name in ALL:
-        words: ReasonText = ALL[name]
-        assert words.meaning and not words.meaning.endswith(".") and words.remedy.endswith("."), name
-        assert set(words.parameters) <= parameters(repository), name
-        for file, limit in words.limits:
+        text: ReasonText = ALL[name]
+        assert text.meaning and not text.meaning.endswith(".") and text.remedy.endswith("."), name
+        assert set(text.parameters) <= parameters(repository), name
+        for file, limit in text.limits:
             module = "objreg_ros." + file.removesuffix(".py").replace("/", ".")
             assert hasattr(importlib.import_module(module), limit), f"{module} has no {limit}"

@@ -24,8 +24,8 @@ def test_frames_that_come_late_are_not_tracked() -> None:
 
 
 def test_rows_that_are_not_there_are_none_and_odd_ones_are_named() -> None:
-    told = tracked()
-    assert len(read_rows("walk", told, "glimpses", glimpse_of)) == len(told["glimpses"])
+    run = tracked()
+    assert len(read_rows("walk", run, "glimpses", glimpse_of)) == len(run["glimpses"])
     assert read_rows("walk", {}, "glimpses", glimpse_of) == ()
     with pytest.raises(ValueError, match="walk: expected glimpses as"):
         read_rows("walk", {"glimpses": [{"stamp_ns": 1, "tracked": {"session": 0}}]}, "glimpses", glimpse_of)

@@ -49,15 +49,15 @@ BAD: list[tuple[str, Any]] = [
 @pytest.mark.parametrize(("field", "value"), BAD)
 def test_a_field_of_another_form_is_refused_by_name_with_what_to_do(field: str, value: object) -> None:
     got = re.escape(json.dumps(value))
-    words = rf"^run: expected {field} to be .+, got {got}; run objreg offline again$"
-    with pytest.raises(ValueError, match=words):
+    message = rf"^run: expected {field} to be .+, got {got}; run objreg offline again$"
+    with pytest.raises(ValueError, match=message):
         require_form("run", {**summary(), field: value})
 
 
 def test_long_values_are_cut() -> None:
-    with pytest.raises(ValueError, match="…; run objreg offline again") as told:
+    with pytest.raises(ValueError, match="…; run objreg offline again") as error:
         require_form("run", {"frames": "x" * 10_000})
-    assert len(str(told.value)) < 200
+    assert len(str(error.value)) < 200
 
 
 def test_the_json_of_runs_and_of_older_versions_has_the_form() -> None:

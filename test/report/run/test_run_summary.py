@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a story knows of a run."""
+"""What a summary knows of a run."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def test_a_false_closure_is_known_by_the_truth_and_pruned_by_the_map() -> None:
 
 
 def test_every_frame_is_on_the_way_of_a_camera_at_rest_too() -> None:
-    told = summary()
-    for row in told["glimpses"]:
+    written = summary()
+    for row in written["glimpses"]:
         row["T_odom_camera"] = TRUE[0].tolist()
-    tracks = RunSummary.of("rest", told, TRUTH).tracks()
+    tracks = RunSummary.of("rest", written, TRUTH).tracks()
     assert list(tracks.stamps_ns) == TRUTH.stamps_ns
     assert tracks.odometry.shape == tracks.corrected.shape == (COUNT, 3)
 
@@ -59,24 +59,24 @@ ODD = [
 
 @pytest.mark.parametrize(("key", "field", "value"), ODD)
 def test_a_number_that_no_run_has_is_refused_by_the_name_of_its_run(key: str, field: str, value: object) -> None:
-    told = summary()
-    told[key][1][field] = value
+    written = summary()
+    written[key][1][field] = value
     with pytest.raises(ValueError, match=f"^walk: expected {key} as `objreg offline --json` writes them, got "):
-        RunSummary.of("walk", told, TRUTH)
+        RunSummary.of("walk", written, TRUTH)
 
 
 def test_a_refused_pose_that_is_not_finite_is_none_to_look_at() -> None:
-    told = summary()
-    told["refusals"][1]["T_from_to"] = np.full((4, 4), np.inf).tolist()
-    assert RunSummary.of("walk", told, TRUTH).refusals[1].T_from_to is None
+    written = summary()
+    written["refusals"][1]["T_from_to"] = np.full((4, 4), np.inf).tolist()
+    assert RunSummary.of("walk", written, TRUTH).refusals[1].T_from_to is None
 
 
 @pytest.mark.parametrize("pose", [[[float("nan")] * 4] * 4, np.eye(3).tolist(), np.zeros((4, 4)).tolist()])
 def test_a_frame_without_a_rigid_pose_is_refused_by_the_name_of_its_run(pose: list[list[float]]) -> None:
-    told = summary()
-    told["glimpses"][3]["T_odom_camera"] = pose
+    written = summary()
+    written["glimpses"][3]["T_odom_camera"] = pose
     with pytest.raises(ValueError, match=r"^walk: expected glimpses as `objreg offline --json` writes them, got "):
-        RunSummary.of("walk", told, TRUTH)
+        RunSummary.of("walk", written, TRUTH)
 
 
 def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:
@@ -86,10 +86,10 @@ def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:
 
 
 def test_without_odometry_there_are_no_tracks_and_no_object_map() -> None:
-    told = summary()
-    for row in told["glimpses"]:
+    written = summary()
+    for row in written["glimpses"]:
         row["T_odom_camera"] = None
-    run = RunSummary.of("walk", told, TRUTH)
+    run = RunSummary.of("walk", written, TRUTH)
     assert run.tracks() is None and run.objects() == []
 
 
@@ -100,41 +100,41 @@ def test_one_object_is_one_place_in_the_map_and_several_by_odometry() -> None:
 
 
 def test_frames_whose_time_does_not_advance_are_left_out_and_counted() -> None:
-    told = summary()
-    again = [dict(told["glimpses"][k]) for k in (119, 7, 0)]
+    written = summary()
+    again = [dict(written["glimpses"][k]) for k in (119, 7, 0)]
     early = {**again[0], "stamp_ns": -5}
-    run = RunSummary.of("walk", {**told, "glimpses": [*told["glimpses"], *again, early]}, TRUTH)
-    once = RunSummary.of("walk", told, TRUTH)
+    run = RunSummary.of("walk", {**written, "glimpses": [*written["glimpses"], *again, early]}, TRUTH)
+    once = RunSummary.of("walk", written, TRUTH)
     assert (once.left_out, run.left_out) == (0, 4)
     np.testing.assert_array_equal(run.tracks().corrected, once.tracks().corrected)
     assert len(run.objects()) == len(once.objects())
 
 
-def test_an_older_json_without_frames_is_told_all_the_same() -> None:
-    told = {key: value for key, value in summary().items() if key not in ("glimpses", "refusals")}
-    run = RunSummary.of("walk", told, TRUTH)
+def test_an_older_json_without_frames_is_read_all_the_same() -> None:
+    written = {key: value for key, value in summary().items() if key not in ("glimpses", "refusals")}
+    run = RunSummary.of("walk", written, TRUTH)
     assert len(run.closures) == 4 and run.tracks() is None
     assert run.seconds(run.closures[0].to_ns) == pytest.approx(6.0)
 
 
 def test_labels_read_as_words() -> None:
-    told = summary()
-    told["constraints"][0]["labels"] = ["cereal_box"]
-    told["glimpses"][0] |= {"labels": ["soda_can"], "objects": [["soda_can", [0.0, 0.0, 1.0]]]}
-    run = RunSummary.of("walk", told, TRUTH)
+    written = summary()
+    written["constraints"][0]["labels"] = ["cereal_box"]
+    written["glimpses"][0] |= {"labels": ["soda_can"], "objects": [["soda_can", [0.0, 0.0, 1.0]]]}
+    run = RunSummary.of("walk", written, TRUTH)
     assert run.closures[0].labels == ("cereal box",) and run.glimpses[0].labels == ("soda can",)
     assert run.glimpses[0].objects[0][0] == "soda can"
 
 
-def test_the_pose_that_was_refused_is_told_where_there_was_one() -> None:
-    told = summary()
-    told["refusals"][1]["T_from_to"] = np.eye(4).tolist()
-    refusals = RunSummary.of("walk", told, TRUTH).refusals
+def test_the_pose_that_was_refused_is_kept_where_there_was_one() -> None:
+    written = summary()
+    written["refusals"][1]["T_from_to"] = np.eye(4).tolist()
+    refusals = RunSummary.of("walk", written, TRUTH).refusals
     assert refusals[0].T_from_to is None
     np.testing.assert_array_equal(refusals[1].T_from_to, np.eye(4))
 
 
-def test_without_the_solver_the_way_is_that_of_odometry_and_the_story_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_solver_the_way_is_that_of_odometry_and_the_run_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gtsam", None)
     run = RunSummary.of("walk", summary(), TRUTH)
     assert "expected gtsam" in run.map.unsolved and not run.pruned
@@ -151,10 +151,10 @@ def test_a_frame_of_another_time_does_not_stretch_the_run_and_is_counted(years: 
 
 
 def test_a_run_with_a_short_rest_is_one_stretch() -> None:
-    told = summary()
-    for row in told["glimpses"][60:]:
+    written = summary()
+    for row in written["glimpses"][60:]:
         row["stamp_ns"] += 3000 * 10**9
-    run = RunSummary.of("walk", told, TRUTH)
+    run = RunSummary.of("walk", written, TRUTH)
     assert run.out_of_time == {} and run.stretch_ns[1] > 3000 * 10**9
 
 
@@ -169,9 +169,9 @@ def test_our_own_tracking_is_corrected_as_odometry_is_and_named_as_what_it_is() 
 
 
 def test_of_a_track_that_was_lost_the_largest_part_is_on_the_map() -> None:
-    told = tracked(begins=45)  # closures tie 40 to 100, but one alone ties no session
-    told["constraints"] = [row for row in told["constraints"] if row["from_ns"] == 40 * 100_000_000]
-    run = RunSummary.of("walk", told, TRUTH)
+    written = tracked(begins=45)  # closures tie 40 to 100, but one alone ties no session
+    written["constraints"] = [row for row in written["constraints"] if row["from_ns"] == 40 * 100_000_000]
+    run = RunSummary.of("walk", written, TRUTH)
     trajectory = run.trajectory()
     assert (trajectory["frames"], trajectory["frames_apart"], trajectory["sessions_apart"]) == (75, 45, 1)
     assert run.left_out == 0 and len(run.tracks().corrected) == 75

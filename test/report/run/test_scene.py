@@ -29,7 +29,7 @@ def test_the_ways_are_there_by_name() -> None:
     assert np.allclose(ways["truth"], run.tracks().true, atol=1e-3)
 
 
-def test_closures_are_told_apart_by_verdict_and_by_what_the_mapper_pruned() -> None:
+def test_closures_are_distinguished_by_verdict_and_by_what_the_mapper_pruned() -> None:
     run = RunSummary.of("walk", summary(false=True), TRUTH)
     run = replace(run, pruned=(run.closures[1], run.closures[4]))
     groups = {group["name"]: group for group in drawn(run)["closures"]}

@@ -34,7 +34,7 @@ def test_every_pair_has_a_row_with_its_numbers() -> None:
     assert rows["r0"]["centimetres"] is None
 
 
-def test_a_run_tells_how_it_was_made() -> None:
+def test_a_run_states_how_it_was_made() -> None:
     made = {"command": "objreg offline x", "version": "0.1.0", "commit": "abc-dirty", "date": "2026-01-01",
             "model": {"name": "cups.onnx", "sha256": "0123"}, "params": {"detector.threshold": 0.4}}  # fmt: skip
     rows = dict(view({**summary(), "about": made})["about"])
@@ -43,7 +43,7 @@ def test_a_run_tells_how_it_was_made() -> None:
     assert view(summary())["about"] == []
 
 
-def test_findings_are_told_in_the_head_and_escaped() -> None:
+def test_findings_are_shown_in_the_head_and_escaped() -> None:
     text = page([(RunSummary.of("walk", {**summary(), "findings": [FINDING]}, TRUTH), None)])
     head = text[: text.index('class="tiles"')]
     assert "No image was read." in head and "All &lt;malformed&gt;." in head
@@ -144,12 +144,12 @@ def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_str
 def test_our_own_tracking_is_drawn_corrected_with_what_of_it_is_left_out() -> None:
     lost = tracked(begins=45)
     lost["constraints"] = []
-    for of_run, words in (
+    for of_run, text in (
         (tracked(), "120 of 120 frames"),
         (lost, "45 frames in 1 more session are not: nothing ties"),
     ):
         way = view(of_run)["trajectory"]
-        assert words in way["text"] and "There is no odometry" in way["text"]
+        assert text in way["text"] and "There is no odometry" in way["text"]
         assert ("tracked", "our own tracking") in way["legend"] and ("corrected", "corrected") in way["legend"]
         assert 'class="line tracked"' in way["drawing"]["wide"]
     assert "than our own tracking" in next(tile for tile in view(tracked())["tiles"] if "error" in tile["name"])["note"]

@@ -34,8 +34,8 @@ PAIRS = pairs_of(RunSummary.of("walk", summary(false=True), TRUTH))
 
 
 def test_a_moment_of_two_pairs_is_kept_once_and_a_pose_has_its_overlay() -> None:
-    told = {**summary(), "refusals": [refusal("texture_disagrees", 5, 99)]}  # 5 is a moment of the first closure too
-    drawn = thumbnails(pairs_of(RunSummary.of("walk", told, TRUTH)), Wall())
+    run = {**summary(), "refusals": [refusal("texture_disagrees", 5, 99)]}  # 5 is a moment of the first closure too
+    drawn = thumbnails(pairs_of(RunSummary.of("walk", run, TRUTH)), Wall())
     assert len(drawn.moments) == 9 and list(drawn.overlays) == ["c0", "c1", "c2", "c3"]
     assert all(uri.startswith("data:image/webp;base64,") for uri in (*drawn.moments.values(), *drawn.overlays.values()))
     assert drawn.left_out == 0 and not drawn.lacking

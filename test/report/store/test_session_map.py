@@ -10,7 +10,7 @@ import pytest
 
 from objreg_tools.report.store.session_map import session_maps
 from objreg_tools.report.store.store_summary import survey
-from report.places import at, cup_and_book, store_of, told
+from report.places import at, closure_of_move, cup_and_book, store_of
 
 
 def test_every_session_has_a_map_with_what_it_saw(tmp_path: Path) -> None:
@@ -29,7 +29,7 @@ def test_a_map_leaves_out_the_axis_of_least_spread(tmp_path: Path) -> None:
 
 def test_a_move_is_on_the_map_of_the_session_that_saw_it(tmp_path: Path) -> None:
     shown = [(1.0, 0, at(0.0)), (2.0, 1, at(0.4))]
-    before, after = session_maps(survey(store_of(tmp_path / "s.db", shown, [told(1.0, 2.0)])))
+    before, after = session_maps(survey(store_of(tmp_path / "s.db", shown, [closure_of_move(1.0, 2.0)])))
     assert before.moves == ()
     ((label, stood, stands),) = after.moves
     assert label == "cup" and stands - stood == pytest.approx(np.array([0.4, 0.0]), abs=1e-6)

@@ -12,7 +12,7 @@ from registration.samples import moved
 
 from objreg_tools.report.store.session_ties import MOST, SessionTie, joined
 from objreg_tools.report.store.store_summary import describe, survey
-from report.places import at, store_of, told, tying
+from report.places import at, closure_of_move, store_of, tying
 
 
 def tie(earlier: int, later: int, x: float) -> SessionTie:
@@ -42,7 +42,11 @@ def test_a_closure_that_names_the_later_session_first_ties_the_same_way(tmp_path
 
 def test_closures_within_a_session_without_one_or_of_keyframes_that_are_gone_tie_nothing(tmp_path: Path) -> None:
     shown = [(1.0, 0, at(0.0)), (2.0, 1, at(0.0))]
-    closures = [told(1.0, 2.0), tying(1.0, 9.0, 0, 1, 0.0), replace(tying(1.0, 2.0, 0, 1, 0.0), to_session=None)]
+    closures = [
+        closure_of_move(1.0, 2.0),
+        tying(1.0, 9.0, 0, 1, 0.0),
+        replace(tying(1.0, 2.0, 0, 1, 0.0), to_session=None),
+    ]
     assert survey(store_of(tmp_path / "s.db", shown, closures)).ties == ()
 
 

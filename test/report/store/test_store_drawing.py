@@ -13,7 +13,7 @@ from objreg_ros.memory.store import Store
 from objreg_tools.report.store.portraits import TILE, portraits
 from objreg_tools.report.store.store_drawing import CAPTION, MOVED, PANEL, draw
 from objreg_tools.report.store.store_summary import survey
-from report.places import at, cup_and_book, store_of, told
+from report.places import at, closure_of_move, cup_and_book, store_of
 
 
 def test_every_session_has_a_panel_and_the_objects_are_below(tmp_path: Path) -> None:
@@ -37,7 +37,7 @@ def test_many_sessions_stay_within_what_a_viewer_opens(tmp_path: Path, monkeypat
 def test_a_moved_object_has_an_arrow(tmp_path: Path) -> None:
     shown = [(1.0, 0, at(0.0)), (2.0, 0, at(0.4))]
     still = survey(store_of(tmp_path / "a.db", shown))
-    moved = survey(store_of(tmp_path / "b.db", shown, [told(1.0, 2.0)]))
+    moved = survey(store_of(tmp_path / "b.db", shown, [closure_of_move(1.0, 2.0)]))
     assert not (draw(still, {}) == MOVED).all(axis=2).any() and (draw(moved, {}) == MOVED).all(axis=2).sum() > 50
 
 

@@ -18,7 +18,7 @@ from objreg_tools.report.store.portraits import TILE
 from objreg_tools.report.store.store_page import WIDTHS_TIED, store_page
 from objreg_tools.report.store.store_summary import survey
 from report.chromium import chromium
-from report.places import at, cup_and_book, store_of, told, tying
+from report.places import at, closure_of_move, cup_and_book, store_of, tying
 
 
 class Rows(HTMLParser):
@@ -108,7 +108,9 @@ return [rows.map((row) => row.dataset.name), [...document.querySelectorAll("text
 def test_a_page_says_what_moved_or_that_no_constraint_shows_it(tmp_path: Path) -> None:
     shown = [(1.0, 0, at(0.0)), (2.0, 0, at(0.4))]
     still = store_page(survey(store_of(tmp_path / "a.db", shown)), {})
-    moved = store_page(survey(store_of(tmp_path / "b.db", shown, [told(1.0, 2.0), told(1.0, 9.0)])), {})
+    moved = store_page(
+        survey(store_of(tmp_path / "b.db", shown, [closure_of_move(1.0, 2.0), closure_of_move(1.0, 9.0)])), {}
+    )
     assert "No constraint of this store shows that an object moved" in still
     assert "went 0.40 m between 0.0 s of session 0 and 1.0 s of session 0" in moved
     assert "1 constraints report another" in moved

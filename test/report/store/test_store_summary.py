@@ -39,7 +39,7 @@ def test_a_description_names_what_is_there(place: Path) -> None:
     assert "3 keyframes" in text and "cup 3" in text and "session 0: 2 keyframes, 4 objects in 10.0 s" in text
 
 
-def test_a_description_tells_the_noise_of_the_depth_of_stored_views(tmp_path: Path) -> None:
+def test_a_description_states_the_noise_of_the_depth_of_stored_views(tmp_path: Path) -> None:
     rng, store = np.random.default_rng(0), Store(tmp_path / "noisy.db")
     z = 2.0 + 2.0 * depth_sigma(np.full((120, 160), 2.0)) * rng.normal(size=(120, 160))
     for number in (1, 2, 3):
@@ -55,13 +55,13 @@ def test_a_description_tells_the_noise_of_the_depth_of_stored_views(tmp_path: Pa
     assert f"depth noise of the views: {found.depth_noise:.2f} (a Kinect v1 has 1)" in describe(found)
 
 
-def test_a_store_whose_views_have_too_little_depth_tells_no_noise(tmp_path: Path) -> None:
+def test_a_store_whose_views_have_too_little_depth_states_no_noise(tmp_path: Path) -> None:
     Store(tmp_path / "empty.db").close()
     found = survey(tmp_path / "empty.db")
     assert found.depth_noise is None and "noise" not in describe(found)
 
 
-def test_a_store_is_told_from_other_files(place: Path, tmp_path: Path) -> None:
+def test_a_store_is_distinguished_from_other_files(place: Path, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("no store")
     assert is_store(place)
     assert not is_store(tmp_path / "notes.txt") and not is_store(tmp_path) and not is_store(tmp_path / "nothing")
@@ -72,7 +72,7 @@ def test_an_empty_store_has_a_description(tmp_path: Path) -> None:
     assert "0 keyframes" in describe(survey(tmp_path / "empty.db"))
 
 
-def test_a_moment_is_told_from_the_begin_of_its_session(place: Path) -> None:
+def test_a_moment_is_given_from_the_begin_of_its_session(place: Path) -> None:
     found = survey(place)
     assert found.moment(found.sightings[2]) == "10.0 s of session 0"
     assert found.moment(found.sightings[-1]) == "0.0 s of session 1"
