@@ -30,7 +30,7 @@ def late(*_):
     raise BaseException("it takes more than a minute")
 
 signal.signal(signal.SIGALRM, late)
-told = {}
+ended = {}
 for name, words in json.load(sys.stdin).items():
     out, err, code = io.StringIO(), io.StringIO(), 0
     signal.alarm(60)
@@ -42,19 +42,19 @@ for name, words in json.load(sys.stdin).items():
     except BaseException:
         code = traceback.format_exc()
     signal.alarm(0)
-    told[name] = (code, err.getvalue())
-print("TOLD" + json.dumps(told))
+    ended[name] = (code, err.getvalue())
+print("ENDED" + json.dumps(ended))
 """
 
 
 def call_each(calls: Mapping[str, list[str]], cwd: Path) -> dict[str, tuple[object, str]]:
     """By the name of a call its exit status (or its traceback) and what it said on stderr."""
-    words = [sys.executable, "-c", CALLS]
-    told = subprocess.run(
-        words, input=json.dumps(calls), capture_output=True, text=True, timeout=PATIENCE_S, cwd=cwd, check=False
+    command = [sys.executable, "-c", CALLS]
+    done = subprocess.run(
+        command, input=json.dumps(calls), capture_output=True, text=True, timeout=PATIENCE_S, cwd=cwd, check=False
     )
-    assert "TOLD" in told.stdout, told.stderr[-3000:]
-    return {name: (code, err) for name, (code, err) in json.loads(told.stdout.partition("TOLD")[2]).items()}
+    assert "ENDED" in done.stdout, done.stderr[-3000:]
+    return {name: (code, err) for name, (code, err) in json.loads(done.stdout.partition("ENDED")[2]).items()}
 
 
 def hostile_files(folder: Path, suffix: str, good: bytes = b"") -> dict[str, Path]:

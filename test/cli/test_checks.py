@@ -36,7 +36,7 @@ def test_a_package_that_cannot_be_imported_stops_runs_in_its_own_words(
     assert check.stops and check.found == "OSError: libGL.so.1: cannot open" and "scripts/bootstrap" in check.todo
 
 
-def test_a_package_is_told_with_its_version() -> None:
+def test_a_package_is_listed_with_its_version() -> None:
     check = only(list(checks.of_modules(["click"])))
     assert check.found[0].isdigit() and not check.todo
 
@@ -74,7 +74,7 @@ def test_without_ros_the_live_graph_alone_is_out_of_reach(monkeypatch: pytest.Mo
     assert not check.stops and "objreg_ros[ros]" in check.todo
 
 
-def test_ros_is_told_with_its_middleware_and_profile() -> None:
+def test_ros_is_listed_with_its_middleware_and_profile() -> None:
     pytest.importorskip("rclpy")
     found = {check.name: check.found for check in checks.of_ros({"ROS_DISTRO": "jazzy", "ROS_DOMAIN_ID": "7"})}
     assert found["found"].startswith("jazzy, ") and found["RMW"].startswith("rmw_") and found["ROS_DOMAIN_ID"] == "7"

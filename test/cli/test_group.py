@@ -79,7 +79,7 @@ def test_the_group_is_a_click_group() -> None:
     assert isinstance(group, click.Group)
 
 
-def test_an_error_of_many_lines_is_told_in_one(
+def test_an_error_of_many_lines_is_reported_in_one(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(**_: object) -> None:
@@ -122,8 +122,8 @@ def test_a_tab_behind_no_command_imports_none() -> None:
         "import sys; from objreg_tools.cli import main\n"
         "try: main()\nfinally: assert not {'numpy', 'cv2', 'rosbags'} & set(sys.modules)"
     )
-    told = {"_OBJREG_COMPLETE": "bash_complete", "COMP_WORDS": "objreg rep", "COMP_CWORD": "1"}
-    shown = subprocess.run([sys.executable, "-c", code], env={**os.environ, **told}, capture_output=True, text=True)
+    asked = {"_OBJREG_COMPLETE": "bash_complete", "COMP_WORDS": "objreg rep", "COMP_CWORD": "1"}
+    shown = subprocess.run([sys.executable, "-c", code], env={**os.environ, **asked}, capture_output=True, text=True)
     assert shown.stdout.split() == ["plain,replay", "plain,report"] and not shown.stderr
 
 
@@ -134,7 +134,7 @@ def test_a_broken_input_shows_where_it_was_met_if_that_is_asked_for(capsys: pyte
     assert said.startswith("Traceback") and said.splitlines()[-1].startswith("objreg: /nowhere/at/all: no such file")
 
 
-def test_an_error_is_told_although_all_else_is_hushed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_error_is_reported_although_all_else_is_hushed(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main("-q", "inspect", "/nowhere/at/all")
     assert end.value.code == 1 and capsys.readouterr().err.startswith("objreg: /nowhere/at/all: no such file")

@@ -10,10 +10,10 @@ import pytest
 from .hostile import call_each, good_folder, hostile_files, hostile_recordings
 
 
-def require_one_line_each(told: dict[str, tuple[object, str]]) -> None:
+def require_one_line_each(outcomes: dict[str, tuple[object, str]]) -> None:
     """Exit 1, and one line that says what is wrong behind notes and what is under way."""
-    wrong = {name: (code, said[-1500:]) for name, (code, said) in told.items() if not _is_one_line(code, said)}
-    assert told and not wrong, wrong
+    wrong = {name: (code, said[-1500:]) for name, (code, said) in outcomes.items() if not _is_one_line(code, said)}
+    assert outcomes and not wrong, wrong
 
 
 def _is_one_line(code: object, said: str) -> bool:
@@ -35,8 +35,8 @@ def _is_one_line(code: object, said: str) -> bool:
 )
 def test_a_recording_that_cannot_be_read_is_refused(words: list[str], tmp_path: Path) -> None:
     files = hostile_recordings(tmp_path)
-    told = call_each({name: [word.format(file) for word in words] for name, file in files.items()}, tmp_path)
-    require_one_line_each(told)
+    outcomes = call_each({name: [word.format(file) for word in words] for name, file in files.items()}, tmp_path)
+    require_one_line_each(outcomes)
     assert not (tmp_path / "out").exists()
 
 

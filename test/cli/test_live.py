@@ -95,8 +95,8 @@ class Stage:
 
     # What happens
 
-    def reports(self, **told: Balance) -> Callable[[], object]:
-        return lambda: self.counters.update({f"/{room}": balance for room, balance in told.items()})
+    def reports(self, **balances: Balance) -> Callable[[], object]:
+        return lambda: self.counters.update({f"/{node}": balance for node, balance in balances.items()})
 
     def ends(self) -> None:
         """The player has played all."""
@@ -160,13 +160,13 @@ def test_the_keyframe_in_hand_is_ended_when_all_is_through_and_what_comes_of_it_
     assert live.closures == (CLOSURE,) and live.counters["registrar"].published == 8
 
 
-@pytest.mark.parametrize("room", ["detector", "registrar"])
-def test_a_frame_that_is_worked_on_may_take_long(stage: Stage, room: str) -> None:
+@pytest.mark.parametrize("node", ["detector", "registrar"])
+def test_a_frame_that_is_worked_on_may_take_long(stage: Stage, node: str) -> None:
     stage.events += [
-        (1.0, stage.reports(**{room: counters(7, waiting=1)})),
-        (100.0, stage.reports(**{room: counters(8)})),
+        (1.0, stage.reports(**{node: counters(7, waiting=1)})),
+        (100.0, stage.reports(**{node: counters(8)})),
     ]
-    assert stage.run().counters[room] == counters(8)
+    assert stage.run().counters[node] == counters(8)
 
 
 def test_a_frame_that_waits_for_a_partner_is_not_waited_for(stage: Stage) -> None:
@@ -177,20 +177,20 @@ def test_a_frame_that_waits_for_a_partner_is_not_waited_for(stage: Stage) -> Non
     assert stage.run().counters["segmenter"] == counters(7, waiting=1) and stage.called
 
 
-def test_a_node_that_ends_before_it_reports_is_told(stage: Stage) -> None:
+def test_a_node_that_ends_before_it_reports_is_named(stage: Stage) -> None:
     stage.events.insert(0, (1.0, stage.fails))
     with pytest.raises(ValueError, match="registrar ended with status 1"):
         stage.run()
     assert "player" not in stage.started and stage.closed and stage.left
 
 
-def test_nodes_that_never_report_are_told_from_those_that_do(stage: Stage) -> None:
+def test_nodes_that_never_report_are_distinguished_from_those_that_do(stage: Stage) -> None:
     stage.events = [(1.0, stage.reports(detector=counters(0)))]
     with pytest.raises(ValueError, match=r"expected detector, .* to report within 120 s, got \['/detector'\]"):
         stage.run()
 
 
-def test_a_process_that_failed_during_the_play_is_told(stage: Stage) -> None:
+def test_a_process_that_failed_during_the_play_is_named(stage: Stage) -> None:
     stage.events.insert(1, (1.0, stage.fails))
     with pytest.raises(ValueError, match="registrar ended with status 1"):
         stage.run()

@@ -19,11 +19,11 @@ def counters(received: int, published: int, waiting: int = 0, **dropped: int) ->
 
 
 def live(detector: Balance) -> Live:
-    rooms = {"detector": detector, "segmenter": counters(9, 6, 1, unmatched=2), "registrar": counters(6, 6)}
-    return Live(rooms, {"texture_disagrees": 3}, (CLOSURE,), None)
+    nodes = {"detector": detector, "segmenter": counters(9, 6, 1, unmatched=2), "registrar": counters(6, 6)}
+    return Live(nodes, {"texture_disagrees": 3}, (CLOSURE,), None)
 
 
-def test_the_table_tells_what_became_of_every_frame_that_was_sent() -> None:
+def test_the_table_states_what_became_of_every_frame_that_was_sent() -> None:
     text = "\n".join(lines(live(counters(10, 8, overtaken=2)), SENT, summarise([(0.5, 1.25)])))
     rows = {line.split()[0]: line.split() for line in text.splitlines()[:4]}
     assert rows["detector"] == ["detector", "10", "10", "8", "0", "2", "overtaken"]
@@ -37,10 +37,10 @@ def test_without_truth_no_error_is_claimed() -> None:
 
 
 @pytest.mark.parametrize("detector", [counters(10, 8, overtaken=1), counters(11, 11)])
-def test_books_that_do_not_balance_are_refused(detector: Balance) -> None:
+def test_counters_that_do_not_balance_are_refused(detector: Balance) -> None:
     with pytest.raises(ValueError, match="detector: expected in = out"):
         require_balance(live(detector), SENT)
 
 
-def test_books_that_balance_pass() -> None:
+def test_counters_that_balance_pass() -> None:
     require_balance(live(counters(10, 8, overtaken=2)), SENT)

@@ -28,7 +28,7 @@ def test_every_process_has_ended_when_the_block_is_left_by_an_error(tmp_path: Pa
     assert all(sleeper.poll() is not None for sleeper in sleepers)
 
 
-def test_a_failed_process_is_told_with_its_last_words(tmp_path: Path, modules: dict[str, str]) -> None:
+def test_a_failed_process_is_reported_with_its_last_words(tmp_path: Path, modules: dict[str, str]) -> None:
     with Processes(tmp_path / "logs", modules) as processes:
         processes.start("good", "sleeper", ())
         processes.start("bad", "failure", ()).wait(20)

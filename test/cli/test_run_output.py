@@ -89,7 +89,7 @@ def test_json_for_standard_output_is_all_that_goes_there(capsys: pytest.CaptureF
     assert json.loads(received.out) == {"frames": 1} and received.err == "said\n"
 
 
-def test_reasons_are_told_to_who_asks_for_them() -> None:
+def test_reasons_are_given_to_who_asks_for_them() -> None:
     refused = Rejected(reason=Reason.NO_CANDIDATE, from_ns=2, to_ns=1, detail="none is near")
     command = received_by(click.Command("run", callback=lambda: print_reasons([refused])))
     assert CliRunner().invoke(command, []).output == ""

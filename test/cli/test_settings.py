@@ -70,7 +70,7 @@ def test_a_section_that_is_for_no_node_of_ours_is_named(tmp_path: Path, capsys: 
     assert line.startswith("! ignored of the parameter file: /**/registar, camera; the nodes are detector, segmenter")
 
 
-def test_a_refused_value_is_told_with_its_file_and_node_or_with_its_option(tmp_path: Path) -> None:
+def test_a_refused_value_is_reported_with_its_file_and_node_or_with_its_option(tmp_path: Path) -> None:
     file = tmp_path / "p.yaml"
     file.write_text("/**/detector:\n  ros__parameters: {threshold: 2.0}\n")
     with pytest.raises(ValueError, match=r"p\.yaml: detector: threshold: expected 0 … 1, got 2\.0"):
@@ -135,13 +135,13 @@ def test_a_node_takes_a_change_as_an_offline_run_does(change: str) -> None:
 
     from objreg_ros.bridge.node.parameters import Parameters
 
-    room, name, value = parse_change(change)
+    stage, name, value = parse_change(change)
     context = Context()
     context.init(args=["--ros-args", "-p", ros_argument(name, value)])
-    node = Node(room, context=context, start_parameter_services=False)
-    parameters, settings = Parameters(node, *NODES[room]), read_settings(None, [change])
-    for kind in NODES[room]:
-        assert parameters.of(kind) == settings.of(room, kind)
+    node = Node(stage, context=context, start_parameter_services=False)
+    parameters, settings = Parameters(node, *NODES[stage]), read_settings(None, [change])
+    for kind in NODES[stage]:
+        assert parameters.of(kind) == settings.of(stage, kind)
     node.destroy_node()
     context.try_shutdown()
 
@@ -187,7 +187,7 @@ def test_settings_of_an_unknown_parameter_are_refused() -> None:
         Settings({"detector": {"speed": 1}})
 
 
-def test_what_differs_from_the_defaults_is_told_and_nothing_else() -> None:
+def test_what_differs_from_the_defaults_is_listed_and_nothing_else() -> None:
     assert read_settings(None, []).changed() == {}
     changes = ["registrar.seed=7", "detector.threshold=0.4", "segmenter.slop=0.02"]
     assert read_settings(None, changes).changed() == {"detector.threshold": 0.4, "registrar.seed": 7}

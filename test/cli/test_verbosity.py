@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known a command with -q, with -v, and with neither."""
+"""What a command prints with -q, with -v, and with neither."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def said(*words: str) -> Result:
     return CliRunner(**apart).invoke(received_by(group), words)
 
 
-def test_usually_all_but_the_reasons_is_heard() -> None:
+def test_usually_all_but_the_reasons_is_printed() -> None:
     result = said("run")
     assert (result.stdout, result.stderr) == ("a line\nthe result\n", "a note\n")
 
@@ -65,5 +65,5 @@ def test_outside_of_a_command_line_nothing_is_hushed(capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize("words", [("run", "-q", "--nothing"), ("-q", "fly")])
-def test_a_command_line_that_is_none_is_told_although_it_asks_for_quiet(words: tuple[str, ...]) -> None:
+def test_a_command_line_that_is_none_is_reported_although_it_asks_for_quiet(words: tuple[str, ...]) -> None:
     assert "No such" in said(*words).stderr

@@ -59,7 +59,7 @@ def test_options_reach_the_node_that_they_are_for() -> None:
 
 def test_lossless_asks_every_node_for_reliable_delivery_and_keeps_no_pace() -> None:
     setup = setup_of(replace(ASKED, lossless=True, seconds=2.0), INPUTS)
-    assert all(f"{room}:reliable:=true" in arguments for room, arguments in setup.node_args.items())
+    assert all(f"{node}:reliable:=true" in arguments for node, arguments in setup.node_args.items())
     assert setup.replay_args[:3] == ["--lossless", "--end", "2.0"]
 
 
@@ -154,7 +154,7 @@ def test_a_picture_that_needs_what_is_not_installed_is_left_out_and_the_demo_say
     assert "did not draw" in line and "pip install 'objreg_ros[report]'" in line
 
 
-def test_a_camera_that_is_told_reaches_the_player_by_its_option_or_by_the_segmenters_parameter() -> None:
+def test_a_camera_that_is_given_reaches_the_player_by_its_option_or_by_the_segmenters_parameter() -> None:
     assert camera_asked(replace(ASKED, camera="5,5,2,1")) == "5,5,2,1" and camera_asked(ASKED) == ""
     assert camera_asked(replace(ASKED, changes=("segmenter.camera=6,6,2,1",))) == "6,6,2,1"
     assert setup_of(ASKED, INPUTS, "5,5,2,1").replay_args[2:4] == ["--camera", "5,5,2,1"]
@@ -166,8 +166,11 @@ def test_the_report_learns_how_the_run_was_made(place: str, tmp_path: Path, monk
     write_rosbag2(tmp_path / "bag", records())
     asked = replace(ASKED, model="objreg_ssd.onnx", changes=("detector.threshold=0.4",))
     with open_recording(tmp_path / place) as source:
-        told = begun_summary(asked, tmp_path / "my room", source, INPUTS)
-    assert told["recording"] == str(tmp_path / place) and told["name"] == "my room, live"
-    assert told["about"]["command"] == "objreg demo 'my room'" and told["about"]["recording"].endswith("/my room")
-    assert told["about"]["params"] == {"detector.threshold": 0.4} and told["about"]["model"]["name"] == told["model"]
-    json.dumps(told)
+        summary = begun_summary(asked, tmp_path / "my room", source, INPUTS)
+    assert summary["recording"] == str(tmp_path / place) and summary["name"] == "my room, live"
+    assert summary["about"]["command"] == "objreg demo 'my room'" and summary["about"]["recording"].endswith("/my room")
+    assert (
+        summary["about"]["params"] == {"detector.threshold": 0.4}
+        and summary["about"]["model"]["name"] == summary["model"]
+    )
+    json.dumps(summary)

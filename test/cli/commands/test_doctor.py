@@ -50,9 +50,9 @@ def test_quiet_is_the_verdict_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("checks", [[GOOD, ADVICE], [GOOD, PROBLEM]])
 def test_the_json_says_the_same(monkeypatch: pytest.MonkeyPatch, checks: list[Check]) -> None:
     result = examined(monkeypatch, checks, "--json")
-    told = json.loads(result.output)
-    assert told["can_run"] is (PROBLEM not in checks) and result.return_value == int(PROBLEM in checks)
-    assert told["checks"][1]["todo"] == checks[1].todo
+    report = json.loads(result.output)
+    assert report["can_run"] is (PROBLEM not in checks) and result.return_value == int(PROBLEM in checks)
+    assert report["checks"][1]["todo"] == checks[1].todo
 
 
 def test_this_very_machine_is_examined_without_a_traceback() -> None:

@@ -18,7 +18,7 @@ from objreg_tools.recording.rosbag import messages
 from objreg_tools.recording.rosbag.messages import standard_types
 
 
-def test_a_recording_is_told_with_its_inputs_and_its_truth(tmp_path: Path) -> None:
+def test_a_recording_is_described_with_its_inputs_and_its_truth(tmp_path: Path) -> None:
     result = CliRunner().invoke(command, [str(tum_folder(tmp_path))])
     assert result.exit_code == 0
     for text in ("TUM RGB-D folder, 0.20 s", "sensor_msgs/Image", "64 × 48 16UC1, camera", "3 poses, 1.00 m"):
@@ -56,7 +56,7 @@ def test_a_recording_without_records_begins_at_no_time(tmp_path: Path) -> None:
     assert "0.00 s, 0 records" in output and "UTC" not in output
 
 
-def test_a_topic_of_two_types_is_closed_by_its_more_frequent_one(tmp_path: Path) -> None:
+def test_a_topic_of_two_types_is_listed_by_its_more_frequent_one(tmp_path: Path) -> None:
     types = standard_types()
     image = messages.image(np.zeros((4, 6, 3), np.uint8), "rgb8", 5, "c")
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
@@ -74,7 +74,7 @@ def test_a_remap_shows_in_the_inputs(tmp_path: Path) -> None:
     assert "! the graph cannot run: expected points or a depth image" in result.output
 
 
-def test_a_real_bag_is_told(shared: Path) -> None:
+def test_a_real_bag_is_described(shared: Path) -> None:
     result = CliRunner().invoke(command, [str(shared / "data/bag_soda_can/perception_tutorial.bag")])
     assert "640 × 480 organised, x y z rgb, 32 bytes a point" in result.output
     assert "expected a colour image" in result.output
@@ -102,7 +102,7 @@ def test_columns_line_up() -> None:
     assert columns(("a", "b"), [("long", "x")]) == "a     b\n----  -\nlong  x"
 
 
-def test_what_is_assumed_of_the_lens_is_told(tmp_path: Path) -> None:
+def test_what_is_assumed_of_the_lens_is_stated(tmp_path: Path) -> None:
     folder = tum_folder(tmp_path)
     assert "lens: none stated: taken as rectified" in CliRunner().invoke(command, [str(folder)]).output
     with (folder / "camera.yaml").open("a") as file:
@@ -111,7 +111,7 @@ def test_what_is_assumed_of_the_lens_is_told(tmp_path: Path) -> None:
     assert "lens: plumb_bob, moves a pixel by " in output and "at most; rectified" in output
 
 
-def test_a_lens_that_cannot_be_undone_is_told_with_what_to_do(tmp_path: Path) -> None:
+def test_a_lens_that_cannot_be_undone_is_reported_with_what_to_do(tmp_path: Path) -> None:
     info = messages.camera_info(CAMERA, 10**9, "camera", (0.1,) * 5)
     info.distortion_model = "nobody's"
     write_rosbag2(tmp_path / "bag", [Record.of("/camera_info", info, 10**9)])
@@ -119,10 +119,10 @@ def test_a_lens_that_cannot_be_undone_is_told_with_what_to_do(tmp_path: Path) ->
     assert "lens: not usable, and frames would be dropped: camera_info: lens: expected a distortion model" in output
 
 
-def test_a_camera_that_is_told_is_what_the_graph_would_use(tmp_path: Path) -> None:
-    told = CliRunner().invoke(command, [str(tum_folder(tmp_path / "tum")), "--camera", "50,50,31.5,23.5"])
-    assert told.exit_code == 0 and "64 × 48 fx 50.0 fy 50.0" in told.output
-    assert "! not used, as a camera is given: /camera_info" in told.output
+def test_a_camera_that_is_given_is_what_the_graph_would_use(tmp_path: Path) -> None:
+    result = CliRunner().invoke(command, [str(tum_folder(tmp_path / "tum")), "--camera", "50,50,31.5,23.5"])
+    assert result.exit_code == 0 and "64 × 48 fx 50.0 fy 50.0" in result.output
+    assert "! not used, as a camera is given: /camera_info" in result.output
 
 
 def test_what_the_graph_cannot_run_on_ends_with_three(tmp_path: Path) -> None:

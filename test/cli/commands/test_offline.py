@@ -43,7 +43,7 @@ def offline(*words: object) -> str:
     return result.output
 
 
-def test_a_folder_goes_through_the_real_rooms_and_gives_its_json(model: Path, tmp_path: Path) -> None:
+def test_a_folder_goes_through_the_real_stages_and_gives_its_json(model: Path, tmp_path: Path) -> None:
     folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
     output = offline(folder, "--model", model, "--json", file, "--set", "registrar.seed=7")
     assert "4 frames, 4 detections" in output and "preparing detector" in output
@@ -106,14 +106,14 @@ def test_drifting_odometry_is_named_in_the_json(model: Path, tmp_path: Path) -> 
 
 
 def test_drifting_odometry_is_the_cameras_own_and_takes_no_mounting(model: Path, tmp_path: Path) -> None:
-    mounted = [f"{room}.T_base_camera=[0.3, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5]" for room in ("registrar", "segmenter")]
+    mounted = [f"{stage}.T_base_camera=[0.3, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5]" for stage in ("registrar", "segmenter")]
     words = [word for change in (*mounted, "segmenter.level_odom=true") for word in ("--set", change)]
-    folder, told = tum_folder(tmp_path / "tum", frames=3), []
+    folder, trajectories = tum_folder(tmp_path / "tum", frames=3), []
     for name, changes in (("plain", []), ("mounted", words)):
         file = tmp_path / f"{name}.json"
         output = offline(folder, "--model", model, "--json", file, "--odometry", "drift:3", *changes)
-        told.append([glimpse["T_odom_camera"] for glimpse in json.loads(file.read_text())["glimpses"]])
-    assert told[0] == told[1] and len(told[0]) == 3
+        trajectories.append([glimpse["T_odom_camera"] for glimpse in json.loads(file.read_text())["glimpses"]])
+    assert trajectories[0] == trajectories[1] and len(trajectories[0]) == 3
     assert "! --odometry drift:3 is the camera's own and not level: T_base_camera" in output
 
 
@@ -144,7 +144,7 @@ def test_a_model_that_is_not_there_is_refused(tmp_path: Path) -> None:
         offline(tum_folder(tmp_path), "--model", "no_model.onnx")
 
 
-def test_a_parameter_reaches_its_room(model: Path, tmp_path: Path) -> None:
+def test_a_parameter_reaches_its_stage(model: Path, tmp_path: Path) -> None:
     output = offline(tum_folder(tmp_path, frames=2), "--model", model, "--set", "detector.threshold=0.95")
     assert "2 frames, 0 detections, 0 objects" in output
 
@@ -167,12 +167,12 @@ def test_the_segmenters_colour_reaches_the_run(
     colour: bool, model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list = []
-    monkeypatch.setattr("objreg_tools.cli.recorded.run_offline", lambda *words: seen.append(words[3]) or Run())
+    monkeypatch.setattr("objreg_tools.cli.recorded.run_offline", lambda *given: seen.append(given[3]) or Run())
     offline(tum_folder(tmp_path), "--model", model, "--set", f"segmenter.colour={str(colour).lower()}")
     assert seen[0].segmenter.colour is colour
 
 
-def test_a_camera_that_is_told_takes_the_place_of_the_recordings_and_is_named_in_the_json(
+def test_a_camera_that_is_given_takes_the_place_of_the_recordings_and_is_named_in_the_json(
     model: Path, tmp_path: Path
 ) -> None:
     folder, file = tum_folder(tmp_path / "tum", frames=2), tmp_path / "out.json"
@@ -238,7 +238,7 @@ def test_a_recording_without_odometry_has_the_trajectory_of_our_own_tracking(mod
     assert all((tmp_path / f"{name}.out").stat().st_size for name in ("kitti", "g2o", "map"))
 
 
-def test_the_error_of_a_trajectory_is_told_before_and_after_it_is_corrected(model: Path, tmp_path: Path) -> None:
+def test_the_error_of_a_trajectory_is_stated_before_and_after_it_is_corrected(model: Path, tmp_path: Path) -> None:
     folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
     output = offline(folder, "--model", model, "--json", file, "--odometry", "drift:1")
     error = json.loads(file.read_text())["trajectory"]["error_cm"]
@@ -246,7 +246,7 @@ def test_the_error_of_a_trajectory_is_told_before_and_after_it_is_corrected(mode
     assert f"trajectory error: {error['before']:.1f} cm, corrected {error['after']:.1f} cm (RMS)" in output
 
 
-def test_no_trajectory_is_asked_for_and_none_is_told(model: Path, tmp_path: Path) -> None:
+def test_no_trajectory_is_asked_for_and_none_is_reported(model: Path, tmp_path: Path) -> None:
     folder, file = tum_folder(tmp_path / "tum", frames=2), tmp_path / "out.json"
     assert "trajectory" not in offline(folder, "--model", model, "--json", file, "--odometry", "none")
     summary = json.loads(file.read_text())

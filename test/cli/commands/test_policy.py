@@ -43,8 +43,8 @@ def rules(text: str) -> Rules:
     for enclave in ElementTree.fromstring(text.encode()).iter("enclave"):
         for profile in enclave.iter("profile"):
             for group in profile:
-                ((verb, word),) = group.attrib.items()
-                assert word == "ALLOW"
+                ((verb, permission),) = group.attrib.items()
+                assert permission == "ALLOW"
                 for name in expanded([item.text or "" for item in group], profile.attrib["ns"], profile.attrib["node"]):
                     found[verb, name].add(enclave.attrib["path"].rpartition("/")[2])
     return found

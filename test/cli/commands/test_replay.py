@@ -26,7 +26,7 @@ ROBOT = {"/camera_info", "/depth/image", "/image", "/odom"}
 
 
 class Stage:
-    """Stands in for ROS and for the player, and remembers what it was told."""
+    """Stands in for ROS and for the player, and records what was asked of it."""
 
     def __init__(self) -> None:
         self.ros_args: list[str] | None = None
@@ -117,13 +117,15 @@ def test_the_inputs_go_out_under_the_names_of_the_graph_at_their_own_pace(stage:
     assert result.output.splitlines() == ["the transport", *(f"6 {topic}" for topic in sorted(PLAYED))]
 
 
-def test_images_and_depths_are_told_apart_and_carry_the_stamps_of_their_headers(stage: Stage, tmp_path: Path) -> None:
+def test_images_and_depths_are_distinguished_and_carry_the_stamps_of_their_headers(
+    stage: Stage, tmp_path: Path
+) -> None:
     replay(tum_folder(tmp_path / "late", frames=2, lag=0.004))
-    told = {(item.topic, item.kind, item.header_ns) for _, _, items in stage.plays for item in items}
-    assert {(IMAGE, k * STEP_NS) for k in range(2)} == {(kind, ns) for topic, kind, ns in told if topic == "image"}
-    late = {(kind, ns) for topic, kind, ns in told if topic == "depth/image"}
+    played = {(item.topic, item.kind, item.header_ns) for _, _, items in stage.plays for item in items}
+    assert {(IMAGE, k * STEP_NS) for k in range(2)} == {(kind, ns) for topic, kind, ns in played if topic == "image"}
+    late = {(kind, ns) for topic, kind, ns in played if topic == "depth/image"}
     assert late == {(DEPTH, k * STEP_NS + 4_000_000) for k in range(2)}
-    assert {(kind, ns) for topic, kind, ns in told if topic in ("camera_info", "ground_truth")} == {("", 0)}
+    assert {(kind, ns) for topic, kind, ns in played if topic in ("camera_info", "ground_truth")} == {("", 0)}
 
 
 def test_rate_clock_and_part_are_as_asked(stage: Stage, folder: Path) -> None:
@@ -140,7 +142,7 @@ def test_a_loop_plays_the_same_stamps_until_it_is_interrupted(stage: Stage, fold
     assert len(first) == 24 and others == [first, first] and stage.closed and stage.shut_down
 
 
-def test_a_lossless_replay_keeps_no_pace_and_tells_what_became_of_every_frame(stage: Stage, folder: Path) -> None:
+def test_a_lossless_replay_keeps_no_pace_and_reports_what_became_of_every_frame(stage: Stage, folder: Path) -> None:
     stage.lost = [7, 9]
     output = replay(folder, "--lossless", "--patience", "4", "--wait", "3").output.splitlines()
     assert [play[:2] for play in stage.plays] == [("lossless", 4.0)] and stage.asked[1] == (["finished"], 3.0)
@@ -152,7 +154,7 @@ def test_a_lossless_replay_keeps_no_pace_and_tells_what_became_of_every_frame(st
     ]
 
 
-def test_it_waits_for_those_who_hear_colour_and_depth_and_names_what_nobody_hears(stage: Stage, folder: Path) -> None:
+def test_it_waits_for_who_receives_colour_and_depth_and_names_what_nobody_receives(stage: Stage, folder: Path) -> None:
     stage.deaf = ["/image"]
     result = replay(folder, "--wait", "2")
     assert stage.asked == [(["image", "depth/image"], 2.0)] and "nobody listens to /image" in result.output
@@ -271,7 +273,7 @@ def test_an_input_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
         playable_names(source, Inputs(image="/image", points="/meta"))
 
 
-def test_a_camera_that_is_told_goes_out_once_and_is_kept_for_who_comes_late(stage: Stage, folder: Path) -> None:
+def test_a_camera_that_is_given_goes_out_once_and_is_kept_for_who_comes_late(stage: Stage, folder: Path) -> None:
     replay(folder, "--camera", "100,100,63.5,47.5,128,96", "--start", "0.1")
     ((_, _, items),) = stage.plays
     assert [item.topic for item in items].count("camera_info") == 1 and items[0].topic == "camera_info"

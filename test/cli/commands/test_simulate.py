@@ -104,9 +104,9 @@ def test_a_sensor_brings_its_camera_its_depth_and_what_is_said_of_its_rig_into_t
     assert result.exit_code == 0, result.output
     truth = read_truth(out)
     assert truth.intrinsics.fx == camera_of("realsense_d435", "160x120").fx
-    told = truth.sensors
-    assert told["sensor"] == "active stereo" and told["depth"]["subpixel"] == 0.2
-    assert told["rig"] == {
+    sensors = truth.sensors
+    assert sensors["sensor"] == "active stereo" and sensors["depth"]["subpixel"] == 0.2
+    assert sensors["rig"] == {
         "distortion": list(LENSES["kinect_v1"]), "lag_ms": 25.0, "rolling_ms": 20.0, "blur_ms": 5.0,
         "misregistration_px": 3.0, "misregistration_deg": 0.0, "misregistration_mm": 0.0,
     }  # fmt: skip

@@ -22,7 +22,7 @@ ODDS = ("--set", "registrar.least_odds=20,75,300")
 
 
 @pytest.fixture
-def words(tmp_path: Path) -> list[object]:
+def arguments(tmp_path: Path) -> list[object]:
     """Two recordings, and the model that sees one cup in the middle of every picture."""
     (tmp_path / "labelmap.txt").write_text("cup\ntv\n")
     model = save_constant_model(tmp_path / "tiny.onnx", tf_outputs([[0.3, 0.3, 0.7, 0.7]], [0], [0.9]))
@@ -48,14 +48,14 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     return ran
 
 
-def sweep(*words: object) -> Result:
-    return CliRunner().invoke(command, [*map(str, words)], catch_exceptions=False, standalone_mode=False)
+def sweep(*arguments: object) -> Result:
+    return CliRunner().invoke(command, [*map(str, arguments)], catch_exceptions=False, standalone_mode=False)
 
 
 def test_every_combination_of_all_recordings_is_run_and_written(
-    words: list[object], tmp_path: Path, alone: list[Path]
+    arguments: list[object], tmp_path: Path, alone: list[Path]
 ) -> None:
-    result = sweep(*words, *ODDS, "--set", "detector.threshold=0.3,0.4", "--set", "registrar.seed=7")
+    result = sweep(*arguments, *ODDS, "--set", "detector.threshold=0.3,0.4", "--set", "registrar.seed=7")
     assert result.return_value == 0 and len(alone) == 12 and len(set(alone)) == 6
     assert (
         "6 (3 × 2) combinations of registrar.least_odds, detector.threshold over 2 recordings: 12 runs" in result.output
@@ -70,45 +70,45 @@ def test_every_combination_of_all_recordings_is_run_and_written(
     assert "6 combinations over 2 recordings" in (out / "report.html").read_text()
 
 
-def test_workers_give_the_same_as_this_process(words: list[object], tmp_path: Path) -> None:
-    assert sweep(*words, *ODDS, "--workers", 2).return_value == 0
+def test_workers_give_the_same_as_this_process(arguments: list[object], tmp_path: Path) -> None:
+    assert sweep(*arguments, *ODDS, "--workers", 2).return_value == 0
     written = json.loads((tmp_path / "out/sweep.json").read_text())
     assert [one["frames"] for one in written["combinations"]] == [5, 5, 5]
     assert len([*(tmp_path / "out").glob("runs/*/*.json")]) == 6
 
 
 def test_what_is_done_is_not_done_again_and_a_new_value_adds_its_runs_alone(
-    words: list[object], alone: list[Path]
+    arguments: list[object], alone: list[Path]
 ) -> None:
-    sweep(*words, "--set", "registrar.least_odds=20,75")
-    again = sweep(*words, "--set", "registrar.least_odds=75,20")
+    sweep(*arguments, "--set", "registrar.least_odds=20,75")
+    again = sweep(*arguments, "--set", "registrar.least_odds=75,20")
     assert len(alone) == 4 and "4 runs are done already" in again.output
-    assert "4 runs are done already" in sweep(*words, *ODDS).output and len(alone) == 6
+    assert "4 runs are done already" in sweep(*arguments, *ODDS).output and len(alone) == 6
 
 
 def test_pictures_are_detected_once_for_all_settings_of_the_registrar(
-    words: list[object], alone: list[Path], monkeypatch: pytest.MonkeyPatch
+    arguments: list[object], alone: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[Any] = []
     begin = sweep_work._detector
     monkeypatch.setattr(sweep_work, "_detector", lambda run: made.append(begin(run)) or made[-1])
-    sweep(*words, *ODDS)
+    sweep(*arguments, *ODDS)
     assert len(made) == 2 and [len(one._seen) for one in made] == [3, 2]
 
 
-def test_a_recording_that_fails_stops_no_other(words: list[object], tmp_path: Path, alone: list[Path]) -> None:
-    result = sweep(tmp_path / "gone", *words, *ODDS)
+def test_a_recording_that_fails_stops_no_other(arguments: list[object], tmp_path: Path, alone: list[Path]) -> None:
+    result = sweep(tmp_path / "gone", *arguments, *ODDS)
     assert result.return_value == 3 and "(1 failed)" in result.output and "gone" in result.output
     assert "<h2>Failed</h2>" in (tmp_path / "out/report.html").read_text()
 
 
 @pytest.mark.parametrize("change", ["registrar.least_odds=20", "registrar.least_odds=20,x", "registrar.nothing=1,2"])
-def test_what_cannot_be_swept_is_refused_before_a_run(change: str, words: list[object], alone: list[Path]) -> None:
+def test_what_cannot_be_swept_is_refused_before_a_run(change: str, arguments: list[object], alone: list[Path]) -> None:
     with pytest.raises(ValueError, match=r"registrar|--set"):
-        sweep(*words, "--set", change)
+        sweep(*arguments, "--set", change)
     assert alone == []
 
 
-def test_a_memory_that_all_would_share_is_refused(words: list[object], tmp_path: Path) -> None:
+def test_a_memory_that_all_would_share_is_refused(arguments: list[object], tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"registrar\.store: expected none"):
-        sweep(*words, *ODDS, "--set", f"registrar.store={tmp_path / 'store.db'}")
+        sweep(*arguments, *ODDS, "--set", f"registrar.store={tmp_path / 'store.db'}")

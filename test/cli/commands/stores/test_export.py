@@ -48,8 +48,8 @@ def test_a_store_is_exported(tmp_path: Path) -> None:
 def test_a_damaged_keyframe_is_named_and_the_others_are_exported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def damaged(store: Path, folder: Path, tell: Callable[[str], None], grid: object) -> Iterator[Path]:
-        tell("keyframe 5 is left out: damaged")
+    def damaged(store: Path, folder: Path, notify: Callable[[str], None], grid: object) -> Iterator[Path]:
+        notify("keyframe 5 is left out: damaged")
         yield folder / "map.json"
 
     monkeypatch.setattr("objreg_tools.cli.commands.stores.export.export", damaged)

@@ -44,7 +44,7 @@ def test_two_stores_become_one_that_says_how_they_are_tied(stores: list[Path], t
     assert found["after"][0]["sessions"] == [0, 1] and [len(maps) for maps in found["before"]] == [1, 1]
 
 
-def test_the_error_of_the_map_is_told_where_the_truth_is_known(stores: list[Path], tmp_path: Path) -> None:
+def test_the_error_of_the_map_is_stated_where_the_truth_is_known(stores: list[Path], tmp_path: Path) -> None:
     truth = str(true_path(tmp_path / "truth"))
     result = merged(stores, tmp_path / "both.db", "--truth", truth, "--json", str(tmp_path / "both.json"))
     found = json.loads((tmp_path / "both.json").read_text())
