@@ -34,14 +34,14 @@ def walk(graph: Graph, folder: Path, room: Path) -> None:
     engineer = Walk(folder)
     _play_where_nobody_listens(engineer, room)
     played = engineer.type("replay", str(room), "--lossless", "--end", "15", "--wait", str(PATIENCE_S), *BEHIND)
-    assert all(f"{room}: {FRAMES} published" in played.text for room in STAGES), played.text
+    assert all(f"{stage}: {FRAMES} published" in played.text for stage in STAGES), played.text
 
     graph.wait_for(lambda: bool(graph.received[f"{ROBOT}/constraints"]), what="a constraint")
     closure = from_msg.loop_closure(graph.received[f"{ROBOT}/constraints"][0])
     assert closure.covariance.shape == (6, 6) and closure.from_ns != closure.to_ns
     graph.wait_for(lambda: bool(graph.received[f"{ROBOT}/refusals"]), what="a refusal")
     assert refusal_of(graph.received[f"{ROBOT}/refusals"][0].status[0])
-    _read_the_books(graph)
+    _require_balance(graph)
 
 
 def _play_where_nobody_listens(engineer: Walk, room: Path) -> None:
@@ -51,8 +51,8 @@ def _play_where_nobody_listens(engineer: Walk, room: Path) -> None:
     assert forgot.advises("objreg_graph") and forgot.advises("-r __ns:=/")
 
 
-def _read_the_books(graph: Graph) -> None:
-    """Every node soon tells that all frames are through, and each was published or dropped."""
+def _require_balance(graph: Graph) -> None:
+    """Every node soon reports that all frames are through, and each was published or dropped."""
     graph.wait_for(
         lambda: all(counters.published == FRAMES for counters in graph.counters.values()), what="the counters"
     )

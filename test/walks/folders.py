@@ -17,10 +17,10 @@ SPARE_DEPTH = "/spare/depth"
 TOPICS = ("/image", "/depth/image", "/camera_info", "/odom")
 
 
-def tum_of(room: Path, folder: Path, frames: int, depth_scale: float = 5000, told_scale: float | None = None) -> Path:
-    """The first frames of a room as a TUM folder with ground truth; camera.yaml tells ``told_scale`` where it is given.
+def tum_of(room: Path, folder: Path, frames: int, depth_scale: float = 5000, stated_scale: float | None = None) -> Path:
+    """The first frames of a room as a TUM folder with ground truth.
 
-    ``depth_scale`` and ``told_scale`` are steps in a metre.
+    ``depth_scale`` and ``stated_scale`` are steps in a metre; camera.yaml states the second where it is given.
     """
     for name in ("rgb", "depth"):
         (folder / name).mkdir(parents=True)
@@ -34,7 +34,7 @@ def tum_of(room: Path, folder: Path, frames: int, depth_scale: float = 5000, tol
             cv2.imwrite(str(folder / f"depth/{_seconds(record)}.png"), steps.round().astype("uint16"))
         _write_truth(folder / "groundtruth.txt", opened.records(["/ground_truth"]))
         info = camera_from_msg.intrinsics(next(opened.records(["/camera_info"])).message)
-    camera = {"fx": info.fx, "fy": info.fy, "cx": info.cx, "cy": info.cy, "depth_scale": told_scale or depth_scale}
+    camera = {"fx": info.fx, "fy": info.fy, "cx": info.cx, "cy": info.cy, "depth_scale": stated_scale or depth_scale}
     (folder / "camera.yaml").write_text("".join(f"{name}: {value:g}\n" for name, value in camera.items()))
     return folder
 
@@ -68,7 +68,7 @@ def bag_of(
     """
     names, twice = names or {}, twice or {}
 
-    def told() -> Iterator[Record]:
+    def odd_records() -> Iterator[Record]:
         with open_recording(room) as opened:
             end_ns = opened.start_ns + round(seconds * 1e9)
             for record in opened.records([topic for topic in TOPICS if topic not in without], end_ns=end_ns):
@@ -79,5 +79,5 @@ def bag_of(
                     message.data = message.data[: len(message.data) // 2]
                 yield Record.of(names.get(record.topic, record.topic), message, record.stamp_ns)
 
-    write_rosbag2(folder, told())
+    write_rosbag2(folder, odd_records())
     return folder

@@ -13,7 +13,7 @@ CAMERA = "262.5,262.5,159.5,119.5"
 
 
 def colour_under_an_odd_name(folder: Path, room: Path) -> None:
-    """Its name is given with --remap, and the run that is told next has it too."""
+    """Its name is given with --remap, and the run that is advised next has it too."""
     bag_of(room, folder / "bag", names={"/image": ODD_COLOUR})
     someone = Walk(folder)
     stuck = someone.type("inspect", "bag", ends=3)
@@ -21,24 +21,24 @@ def colour_under_an_odd_name(folder: Path, room: Path) -> None:
     assert stuck.advises("--remap input:=/topic") and stuck.leads_to() == {"waits-for-a-topic"}
     refused = someone.type("offline", "bag", ends=1)
     assert "expected a colour image" in refused.text and "--remap" in refused.text
-    told = someone.type("inspect", "bag", f"--remap=image:={ODD_COLOUR}")
-    assert f"--remap=image:={ODD_COLOUR}" in told.command()
+    inspected = someone.type("inspect", "bag", f"--remap=image:={ODD_COLOUR}")
+    assert f"--remap=image:={ODD_COLOUR}" in inspected.command()
 
 
 def no_camera_info(folder: Path, room: Path) -> None:
-    """The camera is told with --camera, and the run that is told next has it too."""
+    """The camera is given with --camera, and the run that is advised next has it too."""
     bag_of(room, folder / "bag", without={"/camera_info"})
     someone = Walk(folder)
     stuck = someone.type("inspect", "bag", ends=3)
     assert stuck.advises("--camera fx,fy,cx,cy") and stuck.leads_to() == {"no-camera-info"}
-    told = someone.type("inspect", "bag", "--camera", CAMERA)
-    run = someone.follow(told, *FEW)
+    inspected = someone.type("inspect", "bag", "--camera", CAMERA)
+    run = someone.follow(inspected, *FEW)
     assert run.text.count("3 frames") and run.advice()
 
 
 def wrong_depth_scale(folder: Path, room: Path) -> None:
-    """The steps of depth are written into camera.yaml, as was told."""
-    tum_of(room, folder / "mine", frames=6, depth_scale=1000, told_scale=200)
+    """The steps of depth are written into camera.yaml, as was advised."""
+    tum_of(room, folder / "mine", frames=6, depth_scale=1000, stated_scale=200)
     someone = Walk(folder)
     odd = someone.type("inspect", "mine")
     assert "depth begins at" in odd.text and "depth-scale" in odd.leads_to()
@@ -58,7 +58,7 @@ def garbage_in_place_of_depth(folder: Path, room: Path) -> None:
     assert empty.advises("objreg inspect") and empty.advises("--remap")
     seen = someone.type("inspect", "bag", ends=3)
     assert "! depth: " in seen.text and SPARE_DEPTH in seen.text
-    told = someone.type("inspect", "bag", f"--remap=depth:={SPARE_DEPTH}")
-    assert "! depth: " not in told.text
-    run = someone.follow(told, *FEW)
+    inspected = someone.type("inspect", "bag", f"--remap=depth:={SPARE_DEPTH}")
+    assert "! depth: " not in inspected.text
+    run = someone.follow(inspected, *FEW)
     assert run.text.count("3 frames") and run.advice()

@@ -36,16 +36,16 @@ def walk(folder: Path, room: Path) -> None:
     (folder / "mine.py").write_text(READS + _lines_of_the_readme())
     names = sorted(path.name for path in (mine / "rgb").iterdir())
     camera = dict(line.split(": ") for line in (mine / "camera.yaml").read_text().splitlines())
-    words = [camera[name] for name in ("fx", "fy", "cx", "cy")]
+    intrinsics = [camera[name] for name in ("fx", "fy", "cx", "cy")]
 
-    accepted = _run(folder, names[0], names[1], *words)
+    accepted = _run(folder, names[0], names[1], *intrinsics)
     numbers = [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", accepted)]
     T_1_2 = np.reshape(numbers[:16], (4, 4))
     moved, true = T_1_2[:3, 3], _true_distance(mine / "groundtruth.txt", names[0], names[1])
     assert abs(float(np.linalg.norm(moved)) - true) < MOST_CM / 100 and len(numbers) == 16 + 36
 
     (folder / "mine.py").write_text(READS + "depth_2 = 0 * depth_2\n" + _lines_of_the_readme())
-    assert re.match(r"Reason\.|\w+ ", _run(folder, names[0], names[1], *words))
+    assert re.match(r"Reason\.|\w+ ", _run(folder, names[0], names[1], *intrinsics))
 
 
 def _lines_of_the_readme() -> str:
@@ -53,11 +53,11 @@ def _lines_of_the_readme() -> str:
     return (REPOSITORY / "README.md").read_text(encoding="utf-8").split("```python\n")[1].partition("```")[0]
 
 
-def _run(folder: Path, *words: str) -> str:
+def _run(folder: Path, *arguments: str) -> str:
     """What the script prints; it must end well."""
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY), "OMP_NUM_THREADS": "1"}
     done = subprocess.run(
-        [sys.executable, "mine.py", *words],
+        [sys.executable, "mine.py", *arguments],
         cwd=folder, env=environment, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -10,7 +10,7 @@ import pytest
 pytestmark = pytest.mark.ros
 
 
-def test_an_engineer_hears_constraints_refusals_and_diagnostics_of_a_robot(
+def test_an_engineer_receives_constraints_refusals_and_diagnostics_of_a_robot(
     room: Path, tmp_path: Path, domain: int
 ) -> None:
     pytest.importorskip("rclpy", reason="ROS is not installed")

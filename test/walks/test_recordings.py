@@ -40,7 +40,7 @@ def test_of_twenty_recordings_the_one_that_is_cut_off_is_named_and_run_again(roo
         odd_bags.garbage_in_place_of_depth,
     ],
 )
-def test_an_odd_recording_is_put_right_by_what_is_told(way: Any, room: Path, tmp_path: Path) -> None:
+def test_an_odd_recording_is_put_right_by_what_is_advised(way: Any, room: Path, tmp_path: Path) -> None:
     way(tmp_path, room)
 
 

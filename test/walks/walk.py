@@ -25,9 +25,9 @@ class Said:
 
     def advice(self) -> list[str]:
         """What the lines that begin with ``next:`` say; AssertionError where there is none, which is a dead end."""
-        told = re.findall(r"^ *next: (.+)$", self.text, re.MULTILINE)
-        assert told, f"a dead end:\n{self.text}"
-        return told
+        advice = re.findall(r"^ *next: (.+)$", self.text, re.MULTILINE)
+        assert advice, f"a dead end:\n{self.text}"
+        return advice
 
     def command(self) -> list[str]:
         """The last advice, which is a command, as the words behind `objreg`."""
@@ -37,7 +37,7 @@ class Said:
 
     def advises(self, words: str) -> bool:
         """Whether some advice contains the words."""
-        return any(words in told for told in self.advice())
+        return any(words in line for line in self.advice())
 
     def leads_to(self, repository: Path = REPOSITORY) -> set[str]:
         """The sections of the troubleshooting page that are named; AssertionError where the page has no such one."""
@@ -68,5 +68,5 @@ class Walk:
         return Said(text, done.stdout)
 
     def follow(self, said: Said, *more: str, ends: int = 0) -> Said:
-        """Type the command that was told, with ``more`` behind it."""
+        """Type the command that was advised, with ``more`` behind it."""
         return self.type(*said.command(), *more, ends=ends)
