@@ -25,7 +25,7 @@ FEW = 3  # refusals of a pose, in the shortest recording
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, of in runs.SOURCES.items() if isinstance(of, runs.Told)])
+@pytest.mark.parametrize("name", [name for name, of in runs.SOURCES.items() if isinstance(of, runs.Simulated)])
 def test_a_simulated_recording_gives_what_it_gave(name: str, tmp_path: Path) -> None:
     require_the_same(name, runs.simulated(runs.SOURCES[name], tmp_path / name))
 

@@ -60,7 +60,7 @@ def verdicts(results: Results) -> dict[tuple[int, int], list[str]]:
         said.setdefault(_pair(row), []).append("accepted")
     for row in results["refusals"]:
         said.setdefault(_pair(row), []).append(row["reason"])
-    return {pair: sorted(words) for pair, words in said.items()}
+    return {pair: sorted(of_pair) for pair, of_pair in said.items()}
 
 
 def _numbers(stored: Results, now: Results, of: Callable[[Row, Row], Iterator[str]]) -> Iterator[str]:
@@ -136,8 +136,8 @@ def _moments(pair: tuple[int, int]) -> str:
     return f"{pair[0]} to {pair[1]} ns"
 
 
-def _said(words: list[str] | None) -> str:
-    return " and ".join(words) if words else "untried"
+def _said(of_pair: list[str] | None) -> str:
+    return " and ".join(of_pair) if of_pair else "untried"
 
 
 def _text(value: Any) -> str:

@@ -30,15 +30,18 @@ def path_of(name: str) -> Path:
 
 def read(name: str) -> Golden:
     """The golden file of a recording; FileNotFoundError where there is none."""
-    told = json.loads(path_of(name).read_text(encoding="utf-8"))
-    detections = [_detections(row) for row in told.pop("detections")]
-    return Golden({of.stamp_ns: of for of in detections}, told)
+    content = json.loads(path_of(name).read_text(encoding="utf-8"))
+    detections = [_detections(row) for row in content.pop("detections")]
+    return Golden({of.stamp_ns: of for of in detections}, content)
 
 
 def text_of(golden: Golden) -> str:
     """The file's text: a line for each constraint, refusal and picture."""
-    told = {**golden.results, "detections": [_row(of) for of in golden.detections.values()]}
-    fields = [f"{json.dumps(name)}: {_lines(told[name]) if name in ROWS else json.dumps(told[name])}" for name in told]
+    content = {**golden.results, "detections": [_row(of) for of in golden.detections.values()]}
+    fields = [
+        f"{json.dumps(name)}: {_lines(content[name]) if name in ROWS else json.dumps(content[name])}"
+        for name in content
+    ]
     return "{\n" + ",\n".join(fields) + "\n}\n"
 
 

@@ -29,7 +29,7 @@ NO_MODEL_SAW_IT = "expected stored detections of the picture at {} ns, got none;
 Progress = Callable[[int], object]
 
 
-class Told(NamedTuple):
+class Simulated(NamedTuple):
     """What is simulated; its detections were those of the embedded model."""
 
     scenario: str
@@ -46,14 +46,14 @@ class Real(NamedTuple):
     frames: int
 
 
-Source = Told | Real
+Source = Simulated | Real
 SOURCES: dict[str, Source] = {
     "redkitchen_a": Real("redkitchen_a", 128),
-    "loop": Told("loop", 1, 36),
-    "opposite": Told("opposite", 121, 36),
-    "look-alikes": Told("look-alikes", 82, 36),
-    "moved": Told("moved", 125, 36),
-    "stress": Told("moved", 128, 36, stress=True),
+    "loop": Simulated("loop", 1, 36),
+    "opposite": Simulated("opposite", 121, 36),
+    "look-alikes": Simulated("look-alikes", 82, 36),
+    "moved": Simulated("moved", 125, 36),
+    "stress": Simulated("moved", 128, 36, stress=True),
 }
 
 
@@ -70,10 +70,10 @@ class Stored:
         return self.seen[image.stamp_ns]
 
 
-def simulated(told: Told, folder: Path, progress: Progress = lambda done: None) -> Path:
+def simulated(source: Simulated, folder: Path, progress: Progress = lambda done: None) -> Path:
     """The recording, written into a new folder."""
-    sensors = sensors_of(camera_of(told.camera, None), told.stress, ())
-    simulate(folder, told.scenario, told.seed, told.frames, sensors=sensors, progress=progress)
+    sensors = sensors_of(camera_of(source.camera, None), source.stress, ())
+    simulate(folder, source.scenario, source.seed, source.frames, sensors=sensors, progress=progress)
     return folder
 
 
@@ -92,13 +92,13 @@ def run(path: Path, detector: Detects, frames: int, progress: Progress = lambda 
 
 def results(run: Run) -> dict[str, Any]:
     """What is held fast of a run, as JSON: every constraint and refusal with all its numbers."""
-    told = {
+    outcome = {
         "frames": run.frames,
         "dropped": dict(sorted(run.dropped.items())),
         "constraints": [fields_of(closure) for closure in run.closures],
         "refusals": [refusal(rejected) for rejected in run.refusals],
     }
-    return json.loads(json.dumps(told))  # as it is read from a file
+    return json.loads(json.dumps(outcome))  # as it is read from a file
 
 
 def refusal(rejected: Rejected) -> dict[str, Any]:
