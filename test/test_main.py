@@ -40,13 +40,13 @@ import signal, time, weakref
 from objreg_tools import cli
 from objreg_tools.__main__ import main
 
-class Thing:
+class Kept:
     pass
 
 def work(**_):
-    thing = Thing()
-    kept = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
-    del thing  # what a callback raises goes nowhere
+    one = Kept()
+    kept = weakref.ref(one, lambda _: signal.raise_signal(signal.SIGINT))
+    del one  # what a callback raises goes nowhere
     time.sleep(20)
 
 cli.group.main = work
