@@ -30,7 +30,7 @@ def walk(folder: Path, room: Path) -> None:
     someone = Walk(folder)
     words = ("batch", *names, "--out", "runs", *FRAMES, "--no-pages")
     failed = someone.type(*words, ends=3)
-    assert "20 recordings, 1 failed, 57 frames" in failed.output and "seems to be empty" in failed.output
+    assert "recordings: 20, failed: 1, frames: 57" in failed.output and "seems to be empty" in failed.output
     page = body(folder / "runs/report.html")
     assert BROKEN in page and all(name in page for name in names)
     assert len([*(folder / "runs").glob("day_*.json")]) == COUNT - 1
