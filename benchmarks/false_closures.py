@@ -7,6 +7,7 @@ every recording. What it accepts is judged by truth, and apart where one object 
 it is said how often the best pose that was proposed was loosely right, and why it was refused.
 
     python benchmarks/false_closures.py --json OUT
+    python benchmarks/false_closures.py --first-seed 2100 --recordings 25 --keep FOLDER   fresh; goes on where it was
     python benchmarks/false_closures.py --simulate look-alikes:82 --simulate moved:103:qvga:stress
     python benchmarks/false_closures.py --simulate moved:704:realsense_d435 --model truth
     python benchmarks/false_closures.py --simulate loop:9:sensor=realsense_d435:lens=webcam:lag_ms=25:blur_ms=10
@@ -22,6 +23,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -51,6 +53,8 @@ PLANS = (
     "loop:127:qvga:stress",
     "moved:128:realsense_d435:stress",
 )
+FRESH = ("look-alikes", "moved", "opposite", "loop")
+SEEN_BY = ("kinect", "qvga", "sensor=realsense_d435", "sensor=azure_kinect")
 HEAD = f"{'recording':32} {'tried':>6} {'accepted':>9} {'strict':>7} {'loose':>6} {'false':>6}  refused, though right"
 
 
@@ -103,6 +107,31 @@ def _plan_of(scenario: str, seed: str, *more: str) -> Plan:
     plan = Plan(scenario, int(seed), camera, stress, sensor, tuple(f"rig.{k}={v}" for k, v in settings.items()))
     sensors_of(camera_of(camera, None), stress, plan.rig, sensor)  # refuses what is out of range
     return plan
+
+
+def fresh_plans(first_seed: int, count: int) -> list[Plan]:
+    """So many recordings of seeds of their own: every scenario by every camera, half of them with stress."""
+    several = range(len(FRESH))
+    kinds = [(scenario, SEEN_BY[(k + n) % len(SEEN_BY)]) for n in several for k, scenario in enumerate(FRESH)]
+    texts = [
+        f"{scenario}:{first_seed + k}:{camera}{':stress' * (k // 2 % 2)}"
+        for k, (scenario, camera) in zip(range(count), cycle(kinds), strict=False)
+    ]
+    return [plan_of(text) for text in texts]
+
+
+def measured(plan: Plan, frames: int, model: str, keep: Path | None) -> dict[str, Any]:
+    """The figures of one recording, those that are kept where there are any."""
+    file = None if keep is None else keep / f"{plan.name} {frames} {model.replace('/', '_')}.json"
+    if file is not None and file.exists():
+        row: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return row
+    row = measure(plan, frames, model)
+    if file is not None:
+        unfinished = file.with_suffix(".unfinished")
+        unfinished.write_text(json.dumps(row), encoding="utf-8")
+        unfinished.replace(file)
+    return row
 
 
 def measure(plan: Plan, frames: int, model: str) -> dict[str, Any]:
@@ -178,16 +207,35 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
     callback=lambda _context, _option, texts: [plan_of(text) for text in texts],
     help="Simulate this; may be repeated.",
 )
+@click.option("--first-seed", type=click.IntRange(min=0), help="Recordings of this seed and those after it, instead.")
+@click.option("--recordings", type=click.IntRange(min=1), default=25, show_default=True, help="So many of these.")
 @click.option("--frames", type=click.IntRange(min=2), default=400, show_default=True, help="Frames of a recording.")
 @click.option("--model", default="", help="ONNX model; `truth` takes the true boxes.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--processes", type=click.IntRange(min=1), default=2, show_default=True, help="Recordings at once.")
+@click.option(
+    "--keep", type=click.Path(file_okay=False, path_type=Path), help="Keep the figures of each recording here."
+)
 @click.option("--scheduler", default="", metavar="tcp://HOST:PORT", help="A Dask cluster in place of this machine.")
-def main(plans: list[Plan], frames: int, model: str, json_file: Path | None, processes: int, scheduler: str) -> None:
+def main(
+    plans: list[Plan],
+    first_seed: int | None,
+    recordings: int,
+    frames: int,
+    model: str,
+    json_file: Path | None,
+    processes: int,
+    keep: Path | None,
+    scheduler: str,
+) -> None:
     """Hold every keyframe of simulated recordings against ten others, and count what is falsely accepted."""
+    if first_seed is not None:
+        plans = fresh_plans(first_seed, recordings)
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
     rows: dict[str, dict[str, Any]] = {}
     click.echo(HEAD)
-    for done in spread(partial(measure, frames=frames, model=model), plans, processes, scheduler):
+    for done in spread(partial(measured, frames=frames, model=model, keep=keep), plans, processes, scheduler):
         rows[done.item.name] = done.result()
         click.echo(line(done.item.name, rows[done.item.name]))
         rows = {plan.name: rows[plan.name] for plan in plans if plan.name in rows}  # whichever ended first

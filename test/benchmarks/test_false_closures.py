@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import click
 import numpy as np
 import pytest
@@ -81,3 +84,29 @@ def test_closures_are_counted_by_truth_and_by_what_speaks_for_them_and_right_ref
     assert row["one object"] == {"count": 2, "strict": 0, "loose": 0, "false": 1}
     assert row["refused_though_right"] == {Reason.SLACK.value: 1}
     assert added([row, row])["several objects"] == {"count": 4, "strict": 2, "loose": 4, "false": 0}
+
+
+def test_fresh_recordings_are_of_every_scenario_and_camera_in_rooms_of_their_own() -> None:
+    from false_closures import fresh_plans
+
+    plans = fresh_plans(2100, 25)
+    assert [plan.seed for plan in plans] == list(range(2100, 2125))
+    assert len({(plan.scenario, plan.camera, plan.sensor) for plan in plans}) == 16
+    assert {plan.sensor for plan in plans} == {"kinect_v1", "realsense_d435", "azure_kinect"}
+    assert 10 <= sum(plan.stress for plan in plans) <= 15
+
+
+def test_what_is_kept_of_a_recording_is_not_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import false_closures
+
+    asked: list[int] = []
+
+    def measure(plan: Any, frames: int, model: str) -> dict[str, Any]:
+        asked.append(frames)
+        return {"tried": frames}
+
+    monkeypatch.setattr(false_closures, "measure", measure)
+    (plan,) = false_closures.fresh_plans(7, 1)
+    rows = [false_closures.measured(plan, frames, "a/b.onnx", tmp_path) for frames in (60, 60, 90)]
+    assert [row["tried"] for row in rows] == [60, 60, 90] and asked == [60, 90]
+    assert false_closures.measured(plan, 60, "", None) == {"tried": 60}
