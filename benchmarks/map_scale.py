@@ -33,7 +33,7 @@ def ours(walk: Walk) -> dict[str, Any]:
     graph, at = PoseGraph(), 0
     of_odometry, of_closures, of_processor = list[float](), list[float](), list[float]()
     parts, refused = list[dict[str, Any]](), 0
-    every = max(len(walk.closures) // PARTS, 1)
+    ends = {len(walk.closures) * (part + 1) // PARTS for part in range(PARTS)}
     for k, closure in enumerate(tqdm(walk.closures, desc="closures"), 1):
         until = closure.to_ns // PERIOD_NS + 1
         of_odometry += [_seconds(graph.add_odometry, odometry) for odometry in walk.odometry[at:until]]
@@ -45,7 +45,7 @@ def ours(walk: Walk) -> dict[str, Any]:
         summary = graph.optimise()
         of_closures.append(time.perf_counter() - start)
         of_processor.append(time.process_time() - begun)
-        if k % every == 0 or k == len(walk.closures):
+        if k in ends:
             kept = {(one.from_ns, one.to_ns) for one in summary.kept}
             times = {
                 "odometry_ms": _percentiles(of_odometry, (50, 95)),
