@@ -111,7 +111,7 @@ TOPICS = (
         title="Stores merged",
         script="benchmarks/merge.py --keep KEEP",
         quick="--seeds 1 --frames 80",
-        whole="--seeds 1,2 --frames 300",
+        whole="--seeds 1,2 --frames 200",
         minutes=(1.6, 40),
         rows=(
             Row(
