@@ -152,7 +152,7 @@ TOPICS = (
         script="benchmarks/rooms.py --seed 1 --keep KEEP",
         quick="--rooms 2 --frames 60 --simulate loop:61000",
         whole="KITCHEN RPY --simulate moved:9709 --simulate opposite:9702",
-        minutes=(0.7, 60),
+        minutes=(0.6, 60),
         rows=(
             Row("found", "keyframes that could close for which their place is tried", "{found} of {could}", _rooms),
             Row("others", "constraints with another room", "{others} of {constraints}", _rooms),

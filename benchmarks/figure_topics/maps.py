@@ -70,7 +70,7 @@ TOPICS = (
         script="benchmarks/localisation.py --model truth --seed 1 --keep KEEP",
         quick="--simulate loop:95 --frames 160 --kidnappings 1",
         whole="--simulate moved:96,97 --simulate loop:95,98 --frames 600 --kidnappings 6",
-        minutes=(1.2, 40),
+        minutes=(1.1, 40),
         rows=KIDNAPPINGS,
         about="A camera is carried elsewhere at random, in a session of its own and upon an earlier map.",
     ),
@@ -80,7 +80,7 @@ TOPICS = (
         script="benchmarks/localisation.py --seed 1 --model COCO --threshold 0.4 --keep KEEP",
         quick="RPY --kidnappings 1",
         whole="KITCHEN RPY --kidnappings 10",
-        minutes=(1.5, 15),
+        minutes=(2.3, 15),
         rows=KIDNAPPINGS,
         about="Cut and spliced at random.",
     ),
@@ -110,9 +110,9 @@ TOPICS = (
         name="merge",
         title="Stores merged",
         script="benchmarks/merge.py --keep KEEP",
-        quick="--seeds 1 --frames 80",
+        quick="--seeds 1 --frames 60",
         whole="--seeds 1,2 --frames 200",
-        minutes=(1.6, 40),
+        minutes=(1.8, 40),
         rows=(
             Row(
                 "between",
@@ -130,7 +130,7 @@ TOPICS = (
         script="benchmarks/labels.py --seed 74",
         quick="--frames 60",
         whole="--frames 240",
-        minutes=(1.2, 6),
+        minutes=(0.8, 6),
         rows=(
             Row(
                 "right",
