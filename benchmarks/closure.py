@@ -37,6 +37,7 @@ from sources import NO_JITTER, Jitter, Source, detector_of, read_source
 
 import objreg_ros
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.whole_file import write_whole
 from objreg_tools.simulation.scenarios import SCENARIOS
 from objreg_tools.simulation.write import simulate
 from objreg_tools.workers import spread
@@ -96,9 +97,7 @@ class Kept:
     def write(self) -> None:
         """Write the file in one go."""
         self._file.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = self._file.with_suffix(".part")
-        unfinished.write_text(json.dumps(self.row))
-        os.replace(unfinished, self._file)
+        write_whole(self._file, json.dumps(self.row))
 
 
 def compare(path: Path, asked: Asked, kept: Kept) -> dict[str, Any]:

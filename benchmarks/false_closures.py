@@ -33,6 +33,7 @@ from sources import detector_of, read_source
 from objreg_ros.data.closures import UNTRIED, LoopClosure, Rejected
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.whole_file import write_whole
 from objreg_tools.cli.commands.simulate import camera_of, distortion_of, sensors_of
 from objreg_tools.simulation.scenarios import SCENARIOS
 from objreg_tools.simulation.sensors.camera import CAMERAS, SENSORS
@@ -128,9 +129,7 @@ def measured(plan: Plan, frames: int, model: str, keep: Path | None) -> dict[str
         return row
     row = measure(plan, frames, model)
     if file is not None:
-        unfinished = file.with_suffix(".unfinished")
-        unfinished.write_text(json.dumps(row), encoding="utf-8")
-        unfinished.replace(file)
+        write_whole(file, json.dumps(row))
     return row
 
 

@@ -13,6 +13,8 @@ from pathlib import Path
 
 from figure_topics.topic import REPOSITORY, Values
 
+from objreg_ros.whole_file import write_whole
+
 RESULTS = REPOSITORY / "benchmarks/results"
 CURRENT = RESULTS / "current"
 CODE = ("objreg_ros", "objreg_mapper", "objreg_tools", "models", "launch", "config")  # what figures depend on
@@ -40,9 +42,7 @@ class Result:
     def write(self, folder: Path = CURRENT) -> None:
         """Write it whole, in the others' stead."""
         folder.mkdir(parents=True, exist_ok=True)
-        unfinished = folder / f"{self.topic}.unfinished"
-        unfinished.write_text(json.dumps(asdict(self), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-        unfinished.replace(folder / f"{self.topic}.json")
+        write_whole(folder / f"{self.topic}.json", json.dumps(asdict(self), indent=1, ensure_ascii=False) + "\n")
 
 
 def read_result(topic: str, folder: Path = CURRENT) -> Result | None:

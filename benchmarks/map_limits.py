@@ -25,6 +25,7 @@ from objreg_ros.data.checked import Array
 from objreg_ros.data.closures import LoopClosure
 from objreg_ros.data.frames import Frame, Odometry
 from objreg_ros.geometry import inverse, rotation_angle, vector_from_rotation
+from objreg_ros.whole_file import write_whole
 from objreg_tools.report.run.trajectory_error import absolute_trajectory_error
 from objreg_tools.truth import LOOSE, Truth, within
 
@@ -65,9 +66,7 @@ def kept(path: Path, folder: Path, make: Callable[[], Any], suffix: str = ".pick
         click.echo(f"{path.name}: as found before, in {file}", err=True)
         return pickle.loads(file.read_bytes())
     made = make()
-    unfinished = file.with_suffix(".part")
-    unfinished.write_bytes(pickle.dumps(made))
-    os.replace(unfinished, file)
+    write_whole(file, pickle.dumps(made))
     return made
 
 

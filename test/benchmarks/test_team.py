@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots live: which constraints two runs have in common, when a run is over, and how it is started."""
+"""Robots live: when a run is over, and how it is started."""
 
 from __future__ import annotations
 
@@ -9,38 +9,16 @@ import sys
 import time
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import click
 import pytest
 from click.testing import CliRunner
-
-SECOND = 1_000_000_000
 
 
 @pytest.fixture
 def team() -> ModuleType:
     pytest.importorskip("rclpy", reason="the benchmark runs nodes of ROS 2")
     return importlib.import_module("team")
-
-
-def moments(from_robot: str, from_s: float, to_robot: str, to_s: float) -> list[Any]:
-    return [from_robot, to_robot, round(from_s * SECOND), round(to_s * SECOND)]
-
-
-def test_constraints_are_alike_a_second_off_and_from_either_end(team: ModuleType) -> None:
-    one = moments("r1", 10.0, "r2", 20.0)
-    assert team.are_alike(one, moments("r1", 10.9, "r2", 19.1))
-    assert team.are_alike(one, moments("r2", 20.5, "r1", 9.5))
-    assert not team.are_alike(one, moments("r1", 11.1, "r2", 20.0))
-    assert not team.are_alike(one, moments("r2", 10.0, "r1", 20.0))
-    assert not team.are_alike(one, moments("r1", 10.0, "r1", 20.0))
-
-
-def test_each_constraint_is_in_common_once(team: ModuleType) -> None:
-    base = [moments("r1", 10.0, "r2", 20.0), moments("r1", 10.5, "r2", 20.0), moments("r1", 5.0, "r1", 50.0)]
-    assert team.in_common(base, [moments("r2", 20.0, "r1", 10.2), moments("r1", 50.0, "r1", 5.0)]) == 2
-    assert team.in_common(base, base[::-1]) == 3
 
 
 def test_a_run_is_over_when_every_keyframe_of_every_frame_was_searched_for(team: ModuleType) -> None:

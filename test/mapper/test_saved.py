@@ -22,6 +22,7 @@ from .bent import SECOND, bent, closure, distances, odometry, square
 
 TRUE = square(laps=2)
 BENT = bent(TRUE)
+HEADER = "told"  # the member of the file that is a text
 HALF = len(TRUE) // 2
 LATER_NS = 86_400 * SECOND
 ELSEWHERE = pose(rotation_from_vector(np.array([0.0, 0.0, 0.7])), np.array([3.0, 1.0, 0.0]))
@@ -126,9 +127,9 @@ def test_a_file_with_a_wrong_byte_is_refused_or_the_same_map(yesterday: PoseGrap
 
 def changed(arrays: dict[str, np.ndarray], change: Callable[[dict[str, Any]], object]) -> dict[str, np.ndarray]:
     """The arrays of a map whose text was changed."""
-    header = json.loads(arrays["told"].tobytes())
+    header = json.loads(arrays[HEADER].tobytes())
     change(header)
-    return arrays | {"told": np.frombuffer(json.dumps(header).encode(), np.uint8)}
+    return arrays | {HEADER: np.frombuffer(json.dumps(header).encode(), np.uint8)}
 
 
 @pytest.mark.parametrize("stamp", [np.inf, -np.inf, np.nan, 1e300, 2**70, -(2**70), "1", None, True])
@@ -178,15 +179,15 @@ def test_a_map_of_complex_numbers_is_refused(yesterday: PoseGraph, tmp_path: Pat
 
 def test_a_map_of_before_robots_is_of_one_without_a_name(yesterday: PoseGraph, tmp_path: Path) -> None:
     arrays = saved.packed(yesterday)
-    header = json.loads(arrays["told"].tobytes())
+    header = json.loads(arrays[HEADER].tobytes())
     del header["robots"]
     for known in header["closures"]:
         del known["from_robot"], known["to_robot"]
-    arrays["told"] = np.frombuffer(json.dumps(header | {"version": 1}).encode(), np.uint8)
+    arrays[HEADER] = np.frombuffer(json.dumps(header | {"version": 1}).encode(), np.uint8)
     saved.save(arrays, tmp_path / "map.npz")
     found = saved.load(tmp_path / "map.npz", MapperParams())
     assert [one.robot for one in found.sessions] == [""] and found.closure_ties[0].closure.robots == ("", "")
-    arrays["told"] = np.frombuffer(json.dumps(header | {"version": 3}).encode(), np.uint8)
+    arrays[HEADER] = np.frombuffer(json.dumps(header | {"version": 3}).encode(), np.uint8)
     saved.save(arrays, tmp_path / "map.npz")
     with pytest.raises(ValueError, match="version: expected 1 or 2, got 3"):
         saved.load(tmp_path / "map.npz", MapperParams())
