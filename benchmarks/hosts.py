@@ -59,11 +59,13 @@ def lack() -> str | None:
         return "expected the tool `ip`, got none; install iproute2"
     if not TUN.exists() and not netem_works():
         return f"expected {TUN} or a kernel with netem, got neither; `modprobe tun` or `modprobe sch_netem`"
+    name = f"{PREFIX}-{os.getpid()}-{next(NUMBERS)}"
     try:
-        ip("netns", "add", name := f"{PREFIX}-{os.getpid()}-{next(NUMBERS)}")
-        ip("netns", "del", name)
+        ip("netns", "add", name)
     except OSError as error:
         return f"expected network namespaces, got none: {error}; use a container with --privileged"
+    finally:
+        discard(ip, "netns", "del", name)
     return None
 
 
@@ -157,12 +159,12 @@ class Hosts:
 
     def _make(self) -> None:
         self._memory = SHARED / f"{PREFIX}-{self._tag}"
-        self._memory.mkdir()
         self._ending.callback(shutil.rmtree, self._memory, ignore_errors=True)
+        self._memory.mkdir()
         for host, name in enumerate(self.names):
             (self._memory / str(host)).mkdir()
+            self._ending.callback(discard, remove, name)
             ip("netns", "add", name)
-            self._ending.callback(remove, name)
         by_netem = netem_works() if self._by_netem is None else self._by_netem
         (self._bridge_them if by_netem else self._relay_them)()
         for host, name in enumerate(self.names):
@@ -183,8 +185,8 @@ class Hosts:
 
     def _bridge_them(self) -> None:
         self._bridge = f"b{self._tag}"
+        self._ending.callback(discard, ip, "link", "del", self._bridge)
         ip("link", "add", self._bridge, "type", "bridge")
-        self._ending.callback(ip, "link", "del", self._bridge)
         ip("link", "set", self._bridge, "up")
         for host, name in enumerate(self.names):
             self._bridge_ports.append(port := f"v{self._tag}-{host}")
@@ -215,12 +217,17 @@ def remove(name: str) -> None:
     ip("netns", "del", name)
 
 
+def discard(take_away: Callable[..., object], *arguments: str) -> None:
+    """Take away what may be there: a signal that ends the process can come before it is made, and just after."""
+    with contextlib.suppress(OSError):
+        take_away(*arguments)
+
+
 def sweep() -> None:
     """Take away what a process left that was killed outright."""
     for line in ip("netns", "list").splitlines():
         if is_left(name := line.split()[0]):
-            with contextlib.suppress(OSError):  # another one is at it too
-                remove(name)
+            discard(remove, name)  # which another run may do, too
     for folder in SHARED.glob(f"{PREFIX}-*"):
         if is_left(folder.name):
             shutil.rmtree(folder, ignore_errors=True)

@@ -119,3 +119,20 @@ def test_a_run_that_is_ended_takes_its_hosts_away(able: ModuleType, end: signal.
     wait_for(able, mine)
     run.send_signal(end)
     assert run.wait(timeout=10) != 0 and mine not in able.ip("netns", "list")
+
+
+def test_a_signal_just_after_a_host_is_made_leaves_nothing(able: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    ip = able.ip
+
+    def ended(*arguments: str) -> str:
+        said: str = ip(*arguments)
+        if arguments == ("netns", "add", pair.names[1]):
+            raise SystemExit(128 + signal.SIGTERM)
+        return said
+
+    pair = able.Hosts(2, able.Conditions())
+    monkeypatch.setattr(able, "ip", ended)
+    with pytest.raises(SystemExit), pair:
+        pass
+    assert not [name for name in pair.names if name in ip("netns", "list")]
+    assert not list(Path("/dev/shm").glob(f"hosts-{os.getpid()}-*"))
