@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import jinja2
 from figure_results import CURRENT, RESULTS, Result, read_result, version
 from figure_topics import README, TOPICS
-from figure_topics.topic import QUICK, REPOSITORY, Row, Topic
+from figure_topics.topic import QUICK, REPOSITORY, WHOLE, Row, Topic
 
 NOT_MEASURED = "not measured on this version"
 BEGIN, END = "<!-- figures: made by benchmarks/figures.py -->", "<!-- end of figures -->"
@@ -47,7 +47,10 @@ def pages(repository: Path = REPOSITORY) -> dict[str, str]:
 def section(topic: Topic) -> dict[str, Any]:
     """A topic of the page: its rows, and of what they are."""
     result = current(topic)
-    return {"topic": topic, "result": result, "lines": [line(topic, row, result) for row in topic.rows]}
+    lines = [line(topic, row, result) for row in topic.rows]
+    has_picture = result is not None and result.size == WHOLE and topic.picture
+    picture = topic.picture.removeprefix("docs/") if has_picture else ""
+    return {"topic": topic, "result": result, "lines": lines, "picture": picture}
 
 
 def current(topic: Topic) -> Result | None:

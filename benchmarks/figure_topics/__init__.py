@@ -3,10 +3,18 @@
 
 from __future__ import annotations
 
-from figure_topics import live, loops, maps, pairs, parts, robots
+from figure_topics import founding, live, loops, maps, pairs, parts, robots
 from figure_topics.topic import Topic
 
-TOPICS: tuple[Topic, ...] = (*pairs.TOPICS, *loops.TOPICS, *maps.TOPICS, *robots.TOPICS, *live.TOPICS, *parts.TOPICS)
+TOPICS: tuple[Topic, ...] = (
+    *pairs.TOPICS,
+    *founding.TOPICS,
+    *loops.TOPICS,
+    *maps.TOPICS,
+    *robots.TOPICS,
+    *live.TOPICS,
+    *parts.TOPICS,
+)
 
 README = {
     "pairs_rpy.accepted": "pairs of frames of RPY, half of which could close",

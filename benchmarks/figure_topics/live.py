@@ -113,7 +113,7 @@ TOPICS = (
         title="One core, four times the camera's speed",
         script="benchmarks/overload.py --speed 4 --cores 1 --seed 0",
         quick="--seconds 35 --frames 150",
-        whole="--seconds 600",
+        whole="--seconds 300",
         minutes=(1.3, 12),
         rows=(
             Row("frames", "frames that no count accounts for", "{unaccounted}", _overload),
@@ -132,7 +132,7 @@ TOPICS = (
         title="Attacked",
         script="benchmarks/attacks.py --first 0",
         quick="--seconds 40 --workers 1",
-        whole="--seconds 900",
+        whole="--seconds 400",
         minutes=(1.9, 20),
         rows=(
             Row(

@@ -86,7 +86,7 @@ TOPICS = (
         title="Simulated loops",
         script=REAL,
         quick="--simulate loop:9941 --frames 120",
-        whole="--simulate moved:9944,9945 --simulate opposite:9942 --simulate look-alikes:9943 --simulate loop:9941",
+        whole="--simulate moved:9944 --simulate opposite:9942 --simulate look-alikes:9943 --frames 240",
         minutes=(0.8, 60),
         rows=LOOPS,
     ),
@@ -104,7 +104,7 @@ TOPICS = (
         title="Where a robot woke up",
         script="benchmarks/relocalisation.py --seed 1 --keep KEEP",
         quick="--simulate loop:0 --frames 160 --starts 2",
-        whole="--simulate moved:1,2,3,4,5 --simulate loop:0,1,2 --simulate look-alikes:0,1 --starts 4",
+        whole="--simulate moved:1,2,3 --simulate loop:0,1 --simulate look-alikes:0 --frames 240 --starts 3",
         minutes=(0.7, 60),
         rows=(
             Row(
@@ -127,7 +127,7 @@ TOPICS = (
         title="The next day",
         script="benchmarks/relocalisation.py --seed 1 --days --keep KEEP",
         quick="RPY --model COCO --threshold 0.4",
-        whole="KITCHEN RPY --model COCO --threshold 0.4 --simulate days:100,101,102,103",
+        whole="KITCHEN RPY --model COCO --threshold 0.4 --simulate days:100,101",
         minutes=(0.8, 25),
         rows=(
             Row(
@@ -151,7 +151,7 @@ TOPICS = (
         title="Beside other rooms in the store",
         script="benchmarks/rooms.py --seed 1 --keep KEEP",
         quick="--rooms 2 --frames 60 --simulate loop:61000",
-        whole="KITCHEN RPY --simulate moved:9709 --simulate opposite:9702",
+        whole="KITCHEN RPY --rooms 10 --simulate moved:9709",
         minutes=(0.6, 60),
         rows=(
             Row("found", "keyframes that could close for which their place is tried", "{found} of {could}", _rooms),
@@ -163,7 +163,7 @@ TOPICS = (
         title="Three robots, one registrar",
         script="benchmarks/robots.py --keep KEEP --ways 'one registrar'",
         quick="--simulate 1 --frames 80",
-        whole="--simulate 1,2 --frames 500",
+        whole="--simulate 1,2 --frames 200",
         minutes=(1.6, 60),
         rows=(
             Row(
@@ -182,7 +182,7 @@ TOPICS = (
         title="Recordings that are wrong about themselves",
         script="benchmarks/streams.py KITCHEN RPY --model COCO --threshold 0.4 --seed 1000 --keep KEEP",
         quick="--simulate '' --cases 8 --frames 60",
-        whole="--cases 48 --frames 160",
+        whole="--cases 48 --frames 100",
         minutes=(1, 40),
         rows=(
             Row("false", "false constraints", "{false} in {cases} cases", _faults),

@@ -69,7 +69,7 @@ TOPICS = (
         title="Taken elsewhere",
         script="benchmarks/localisation.py --model truth --seed 1 --keep KEEP",
         quick="--simulate loop:95 --frames 160 --kidnappings 1",
-        whole="--simulate moved:96,97 --simulate loop:95,98 --frames 600 --kidnappings 6",
+        whole="--simulate moved:96 --simulate loop:95,98 --frames 300 --kidnappings 4",
         minutes=(1.1, 40),
         rows=KIDNAPPINGS,
         about="A camera is carried elsewhere at random, in a session of its own and upon an earlier map.",
@@ -89,7 +89,7 @@ TOPICS = (
         title="Two places that are alike but for one thing",
         script="benchmarks/twins.py --keep KEEP",
         quick="--seeds 103 --frames 160 --tries 10",
-        whole="--seeds 103,104,105,106,107,108 --frames 240 --tries 100",
+        whole="--seeds 103,104,105 --frames 240 --tries 100",
         minutes=(1, 40),
         rows=(
             Row(

@@ -69,12 +69,6 @@ def _at(raw: Any, least: int) -> Values:
     return {key: row[key] for key in ("accepted", "false", "foretold", "recall")}
 
 
-def _angles(raw: Any) -> Values:
-    rows = raw["by_angle"]
-    show = lambda name: ", ".join(f"{row[name]:.2f}" for row in rows.values())  # noqa: E731
-    return {"ours": show("ours"), "founding": show("founding"), "angles": ", ".join(f"{angle}°" for angle in rows)}
-
-
 TOPICS = (
     Topic(
         name="pairs_rpy",
@@ -116,7 +110,7 @@ TOPICS = (
         title="One object upon another, any angle",
         script="benchmarks/registration.py --seed 9521",
         quick="--quick",
-        whole="--reps 1 --negatives 120 --every 90",
+        whole="--reps 1 --negatives 60 --every 180",
         minutes=(0.8, 30),
         rows=(
             Row(
@@ -126,26 +120,6 @@ TOPICS = (
             Row("false", "false of all that were tried", "{false} of {tried}", _false),
         ),
         about="Simulated, clean and with stress: occluders, ragged silhouettes, bias and warp of depth.",
-    ),
-    Topic(
-        name="paper",
-        title="The founding document's pairs",
-        script="benchmarks/paper.py --seed 20",
-        quick="--quick",
-        whole="--seeds 3",
-        minutes=(0.7, 8),
-        rows=(
-            Row("right", "right, by angle of view", "{ours} at {angles}; its ICP {founding}", _angles),
-            Row(
-                "time",
-                "a pair, preparation apart, and over its 2 s",
-                "{ms} ms, {times} × faster",
-                lambda raw: {
-                    "ms": round(raw["time"]["ours_cpu_ms"], 1),
-                    "times": round(raw["time"]["ratio_paper_cpu_ms"]),
-                },
-            ),
-        ),
     ),
     Topic(
         name="false_closures",

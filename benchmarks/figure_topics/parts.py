@@ -122,7 +122,7 @@ TOPICS = (
         title="The mapper against false closures",
         script="benchmarks/mapper.py robust --seed 0",
         quick="--graphs 20 --peers 'GTSAM LM'",
-        whole="--graphs 200 --peers 'GTSAM LM,GTSAM GNC'",
+        whole="--graphs 60 --peers 'GTSAM LM,GTSAM GNC'",
         minutes=(0.5, 20),
         rows=(
             Row("worse", "random maps that are worse by more than 1.3 times", "{above} of {graphs}", _robust),
@@ -219,7 +219,7 @@ TOPICS = (
         title="Many recordings over processes",
         script="benchmarks/batch.py --workers 1,2 --keep KEEP",
         quick="--simulate 3 --frames 30",
-        whole="--simulate 24 --frames 80",
+        whole="--simulate 8 --frames 60",
         minutes=(1.2, 20),
         rows=(
             Row("times", "two workers over one", "{times} × as fast, {recordings} recordings", _batch, timed=True),

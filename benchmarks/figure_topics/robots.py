@@ -59,7 +59,7 @@ TOPICS = (
         title="Three robots live",
         script="benchmarks/team.py --keep KEEP",
         quick="--simulate 1 --frames 30 --rate 2",
-        whole="--simulate 1 --frames 500",
+        whole="--simulate 1 --frames 150",
         minutes=(0.8, 15),
         rows=(
             Row("constraints", "constraints", "{closures}, {between} between robots, {false} false", _team),

@@ -55,7 +55,7 @@ class Topic:
     ``KEEP`` stands for a folder in which the command may keep what it has. ``lack`` says what else this machine lacks.
     One that is measured ``alone`` runs beside no other topic, for its times. ``minutes`` are those of the sizes on two
     cores without other work. A command that ``judges`` ends with status 1 where it found something wrong, which is a
-    figure, too.
+    figure, too. The whole size draws a ``picture``, where one is named.
     """
 
     name: str
@@ -69,6 +69,7 @@ class Topic:
     alone: bool = False
     judges: bool = False
     lack: Callable[[], str | None] = nothing
+    picture: str = ""
 
     def command(self, size: str) -> str:
         """The command line of a size as the page has it: without its ``--json`` and what it keeps."""

@@ -29,8 +29,8 @@ def robots() -> ModuleType:
     return importlib.import_module("figure_topics.robots")
 
 
-def measured(robots: ModuleType, name: str, raw: Any) -> dict[str, str]:
-    (topic,) = (topic for topic in robots.TOPICS if topic.name == name)
+def measured(topics: ModuleType, name: str, raw: Any) -> dict[str, str]:
+    (topic,) = (topic for topic in topics.TOPICS if topic.name == name)
     return {row.key: row.measured(row.taken(raw)) for row in topic.rows}
 
 
@@ -73,3 +73,20 @@ def test_what_a_machine_lacks_leaves_the_topic_out(
     (wireless,) = (topic for topic in robots.TOPICS if topic.name == "wireless")
     assert "expected to run as root" in wireless.lacks("quick", tmp_path)
     assert replace(wireless, lack=lambda: None).lacks("quick", tmp_path) == ""
+
+
+def test_the_founding_tables_stand_beside_ours_with_the_true_error() -> None:
+    founding = importlib.import_module("figure_topics.founding")
+    found = {"success": 1.0, "error_m": 0.0026, "rotation_deg": 0.37, "translation_cm": 0.12}
+    none = {"success": 0.0, "error_m": None, "rotation_deg": None, "translation_cm": None}
+    cells = [{"object": name, "document_m": 0.2563, "founding": none, "ours": found} for name in founding.OBJECTS]
+    raw = {
+        "table_1": cells,
+        "table_2": {"soda_can": [cells[0], {**cells[0], "ours": none}]},
+        "by_angle": {"0-30": {"ours": 1.0, "founding": 0.5}},
+        "time": {"ours_cpu_ms": 2.64, "ratio_paper_cpu_ms": 757.4},
+    }
+    rows = measured(founding, "paper", raw)
+    assert rows["table_1_cap"] == "stated 256; its ICP none; ours 2.6 (0.4°, 0.1 cm)"
+    assert rows["table_2"] == "soda can: its ICP 0.00, ours 0.50"
+    assert rows["right"] == "1.00 at 0-30°; its ICP 0.50" and rows["time"] == "2.6 ms, 757 × faster"

@@ -197,6 +197,17 @@ def test_what_is_kept_is_drawn(scripts: dict[str, ModuleType], kept: Path, resul
     assert "| 0.8 s, 188 MB (quick) |" in pages["docs/figures-history.md"]
 
 
+def test_the_picture_of_a_whole_run_stands_below_its_table(
+    scripts: dict[str, ModuleType], kept: Path, result: Any
+) -> None:
+    assert "](pictures/founding.svg)" not in scripts["figure_draw"].pages()["docs/figures.md"]
+    replace(result, topic="paper", size="whole").write(kept)
+    assert (
+        "\n\n![The founding document's pairs](pictures/founding.svg)\n\n"
+        in (scripts["figure_draw"].pages()["docs/figures.md"])
+    )
+
+
 def test_times_of_a_busy_machine_say_so(scripts: dict[str, ModuleType], kept: Path, result: Any) -> None:
     replace(result, load=14.0).write(kept)
     assert "| 0.8 s, 188 MB (busy machine) | quick |" in scripts["figure_draw"].pages()["README.md"]
