@@ -305,10 +305,11 @@ def line_graph(sweep: dict[str, list[dict[str, Any]]], file: Path) -> None:
         angles = [cell["angles_deg"][0] for cell in cells]
         top, bottom = axes[:, column]
         stated = [(a, cell["document_m"]) for a, cell in zip(angles, cells, strict=True) if cell["document_m"]]
-        top.semilogy(*zip(*stated, strict=True), "o--", color="#8b8a83", markersize=3, label="the document")
+        top.semilogy(*zip(*stated, strict=True), "--", color="#8b8a83", label="the document")
         for name, (colour, title) in styles.items():
-            top.semilogy(angles, [cell[name]["error_m"] for cell in cells], "o-", color=colour, ms=3, label=title)
-            bottom.plot(angles, [cell[name]["rotation_deg"] for cell in cells], "o-", color=colour, ms=3, label=title)
+            top.semilogy(angles, [cell[name]["error_m"] for cell in cells], color=colour, label=title)
+            bottom.plot(angles, [cell[name]["rotation_deg"] for cell in cells], color=colour, label=title)
+        top.minorticks_off()
         top.set_title(label.replace("_", " "))
         bottom.set_xlabel("change of view about X, °")
         bottom.set_xticks(range(-180, 181, 90))
@@ -316,7 +317,8 @@ def line_graph(sweep: dict[str, list[dict[str, Any]]], file: Path) -> None:
     axes[1, 0].set_ylabel("true rotation error, °")
     axes[0, -1].legend(fontsize=8)
     figure.tight_layout()
-    figure.savefig(file)
+    with pyplot.rc_context({"svg.fonttype": "none"}):  # text, not outlines of letters
+        figure.savefig(file)
 
 
 def show(cell: dict[str, Any]) -> str:
