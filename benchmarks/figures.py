@@ -2,6 +2,7 @@
 """Measures the figures of this version, and draws docs/figures.md and README's table from them.
 
     python benchmarks/figures.py --quick              what has no figures of this code yet, smaller; within 20 minutes
+    python benchmarks/figures.py                      the same, whole; three to four hours
     python benchmarks/figures.py --only pairs_rpy     one topic, whole
     python benchmarks/figures.py --draw               draw only
     python benchmarks/figures.py --release 0.4.0      keep the figures as those of a version

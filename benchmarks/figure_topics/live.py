@@ -114,7 +114,7 @@ TOPICS = (
         script="benchmarks/overload.py --speed 4 --cores 1 --seed 0",
         quick="--seconds 35 --frames 150",
         whole="--seconds 300",
-        minutes=(1.3, 12),
+        minutes=(1.3, 6),
         rows=(
             Row("frames", "frames that no count accounts for", "{unaccounted}", _overload),
             Row("end", "from SIGINT to the end", "{end_s}", _overload, timed=True),
@@ -133,7 +133,7 @@ TOPICS = (
         script="benchmarks/attacks.py --first 0",
         quick="--seconds 40 --workers 1",
         whole="--seconds 400",
-        minutes=(1.9, 20),
+        minutes=(1.9, 8),
         rows=(
             Row(
                 "found",

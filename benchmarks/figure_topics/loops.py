@@ -67,7 +67,7 @@ TOPICS = (
         script=REAL,
         quick="RPY --model COCO --threshold 0.4",
         whole="KITCHEN RPY --model COCO --threshold 0.4",
-        minutes=(1.1, 6),
+        minutes=(1.1, 2),
         rows=LOOPS,
         about="With odometry that drifts by 2 % and 1° a metre.",
     ),
@@ -77,7 +77,7 @@ TOPICS = (
         script=REAL,
         quick="RPY --model nothing",
         whole="KITCHEN RPY --model nothing",
-        minutes=(1, 6),
+        minutes=(1, 2),
         rows=LOOPS,
         about="What stands apart is an object.",
     ),
@@ -87,7 +87,7 @@ TOPICS = (
         script=REAL,
         quick="--simulate loop:9941 --frames 120",
         whole="--simulate moved:9944 --simulate opposite:9942 --simulate look-alikes:9943 --frames 240",
-        minutes=(0.8, 60),
+        minutes=(0.8, 3),
         rows=LOOPS,
     ),
     Topic(
@@ -96,7 +96,7 @@ TOPICS = (
         script=f"{REAL} --jitter 3,4",
         quick="RPY --model COCO --threshold 0.4",
         whole="KITCHEN RPY --model COCO --threshold 0.4",
-        minutes=(1.5, 6),
+        minutes=(1.5, 2),
         rows=LOOPS[:1],
     ),
     Topic(
@@ -105,7 +105,7 @@ TOPICS = (
         script="benchmarks/relocalisation.py --seed 1 --keep KEEP",
         quick="--simulate loop:0 --frames 160 --starts 2",
         whole="--simulate moved:1,2,3 --simulate loop:0,1 --simulate look-alikes:0 --frames 240 --starts 3",
-        minutes=(0.7, 60),
+        minutes=(0.7, 4),
         rows=(
             Row(
                 "found",
@@ -128,7 +128,7 @@ TOPICS = (
         script="benchmarks/relocalisation.py --seed 1 --days --keep KEEP",
         quick="RPY --model COCO --threshold 0.4",
         whole="KITCHEN RPY --model COCO --threshold 0.4 --simulate days:100,101",
-        minutes=(0.8, 25),
+        minutes=(0.8, 5),
         rows=(
             Row(
                 "near",
@@ -152,7 +152,7 @@ TOPICS = (
         script="benchmarks/rooms.py --seed 1 --keep KEEP",
         quick="--rooms 2 --frames 60 --simulate loop:61000",
         whole="KITCHEN RPY --rooms 10 --simulate moved:9709",
-        minutes=(0.6, 60),
+        minutes=(0.6, 3),
         rows=(
             Row("found", "keyframes that could close for which their place is tried", "{found} of {could}", _rooms),
             Row("others", "constraints with another room", "{others} of {constraints}", _rooms),
@@ -164,7 +164,7 @@ TOPICS = (
         script="benchmarks/robots.py --keep KEEP --ways 'one registrar'",
         quick="--simulate 1 --frames 80",
         whole="--simulate 1,2 --frames 200",
-        minutes=(1.6, 60),
+        minutes=(1.6, 5),
         rows=(
             Row(
                 "constraints",
@@ -183,7 +183,7 @@ TOPICS = (
         script="benchmarks/streams.py KITCHEN RPY --model COCO --threshold 0.4 --seed 1000 --keep KEEP",
         quick="--simulate '' --cases 8 --frames 60",
         whole="--cases 48 --frames 100",
-        minutes=(1, 40),
+        minutes=(1, 14),
         rows=(
             Row("false", "false constraints", "{false} in {cases} cases", _faults),
             Row("named", "cause named, of cases that lose closures", "{named} of {losing}", _faults),

@@ -70,7 +70,7 @@ TOPICS = (
         script="benchmarks/localisation.py --model truth --seed 1 --keep KEEP",
         quick="--simulate loop:95 --frames 160 --kidnappings 1",
         whole="--simulate moved:96 --simulate loop:95,98 --frames 300 --kidnappings 4",
-        minutes=(1.1, 40),
+        minutes=(1.1, 14),
         rows=KIDNAPPINGS,
         about="A camera is carried elsewhere at random, in a session of its own and upon an earlier map.",
     ),
@@ -80,7 +80,7 @@ TOPICS = (
         script="benchmarks/localisation.py --seed 1 --model COCO --threshold 0.4 --keep KEEP",
         quick="RPY --kidnappings 1",
         whole="KITCHEN RPY --kidnappings 10",
-        minutes=(2.3, 15),
+        minutes=(2.3, 17),
         rows=KIDNAPPINGS,
         about="Cut and spliced at random.",
     ),
@@ -90,7 +90,7 @@ TOPICS = (
         script="benchmarks/twins.py --keep KEEP",
         quick="--seeds 103 --frames 160 --tries 10",
         whole="--seeds 103,104,105 --frames 240 --tries 100",
-        minutes=(1, 40),
+        minutes=(1, 4),
         rows=(
             Row(
                 "sessions",
@@ -112,7 +112,7 @@ TOPICS = (
         script="benchmarks/merge.py --keep KEEP",
         quick="--seeds 1 --frames 60",
         whole="--seeds 1,2 --frames 200",
-        minutes=(1.8, 40),
+        minutes=(1.8, 15),
         rows=(
             Row(
                 "between",
@@ -130,7 +130,7 @@ TOPICS = (
         script="benchmarks/labels.py --seed 74",
         quick="--frames 60",
         whole="--frames 240",
-        minutes=(0.8, 6),
+        minutes=(0.8, 2),
         rows=(
             Row(
                 "right",

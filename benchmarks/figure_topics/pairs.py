@@ -86,7 +86,7 @@ TOPICS = (
         script="benchmarks/pairs.py KITCHEN --model COCO --seed 19",
         quick="--wanted 25 --peers orb_pnp",
         whole="--wanted 100",
-        minutes=(0.5, 10),
+        minutes=(0.5, 8),
         rows=REAL_PAIRS,
     ),
     Topic(
@@ -95,7 +95,7 @@ TOPICS = (
         script="benchmarks/strangers.py KITCHEN RPY --model COCO --threshold 0.4 --frames 80 --seed 1",
         quick="--pairs 300",
         whole="--pairs 10000 --simulate moved:811 --simulate loop:814:sensor=realsense_d435",
-        minutes=(0.8, 20),
+        minutes=(0.8, 13),
         rows=(
             Row(
                 "accepted",
@@ -111,7 +111,7 @@ TOPICS = (
         script="benchmarks/registration.py --seed 9521",
         quick="--quick",
         whole="--reps 1 --negatives 60 --every 180",
-        minutes=(0.8, 30),
+        minutes=(0.8, 3),
         rows=(
             Row(
                 "right", "right within 5° and 2 cm", "{clean}; with stress {stress}", lambda raw: _both(raw, "success")

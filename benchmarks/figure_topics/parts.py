@@ -80,7 +80,7 @@ TOPICS = (
         script="benchmarks/detector.py --seed 1",
         quick="--quick",
         whole="",
-        minutes=(0.5, 8),
+        minutes=(0.5, 2),
         rows=(
             Row(
                 "map50",
@@ -97,7 +97,7 @@ TOPICS = (
         script="benchmarks/segmentation.py --seed 401",
         quick="--quick",
         whole="",
-        minutes=(0.4, 6),
+        minutes=(0.4, 2),
         rows=(
             Row(
                 "iou",
@@ -123,7 +123,7 @@ TOPICS = (
         script="benchmarks/mapper.py robust --seed 0",
         quick="--graphs 20 --peers 'GTSAM LM'",
         whole="--graphs 60 --peers 'GTSAM LM,GTSAM GNC'",
-        minutes=(0.5, 20),
+        minutes=(0.5, 2),
         rows=(
             Row("worse", "random maps that are worse by more than 1.3 times", "{above} of {graphs}", _robust),
             Row(
@@ -159,7 +159,7 @@ TOPICS = (
         script="benchmarks/sensor.py --seed 31",
         quick="--frames 20",
         whole="--frames 60",
-        minutes=(0.4, 6),
+        minutes=(0.4, 1),
         rows=(
             Row(
                 "offset",
@@ -175,7 +175,7 @@ TOPICS = (
         script="benchmarks/store.py",
         quick="--quick",
         whole="",
-        minutes=(1, 10),
+        minutes=(1, 4),
         rows=(
             Row(
                 "query",
@@ -203,7 +203,7 @@ TOPICS = (
         script="benchmarks/compact.py --model COCO --threshold 0.4 --seed 1",
         quick="RPY --wanted 20",
         whole="RPY --wanted 200",
-        minutes=(0.6, 6),
+        minutes=(0.6, 2),
         rows=(
             Row("size", "a packed keyframe, median (p95)", "{kb} kB ({p95})", _compact),
             Row(
