@@ -90,6 +90,8 @@ def _run(argv: list[str], log: Path, limit_s: float, ends: tuple[int, ...]) -> t
             _end(process)
             raise
     _end(process)
+    if used is None and STOP.is_set():
+        raise TopicError("stopped; the next run measures it")
     if used is None:
         raise TopicError(f"expected an end within {limit_s:.0f} s, got none; see {log}")
     if process.returncode not in ends:

@@ -19,11 +19,12 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from collections.abc import Callable
 from pathlib import Path
 
 import click
+import dask
+from dask.diagnostics import ProgressBar
 from figure_draw import draw
 from figure_results import CURRENT, RESULTS, Result, code_of, read_result
 from figure_run import STOP, TopicError, measure
@@ -44,31 +45,35 @@ def _has(topic: Topic, result: Result | None, size: str, code: str) -> bool:
 
 def measure_all(topics: list[Topic], workers: int, work: Callable[[Topic], Result]) -> list[str]:
     """Measure the topics, first those that may run beside each other; the names of those that failed."""
-    failed: list[str] = []
-    for some, count in (([t for t in topics if not t.alone], workers), ([t for t in topics if t.alone], 1)):
-        with ThreadPoolExecutor(count) as pool:
-            running = {pool.submit(work, topic): topic for topic in some}
-            for future in _ended(running, pool):
-                name = running[future].name
-                try:
-                    result = future.result()
-                except TopicError as error:
-                    failed.append(name)
-                    click.echo(f"{name}: {error}", err=True)
-                else:
-                    click.echo(f"{name}: {result.seconds:.0f} s, {result.processor_seconds:.0f} s of the processor")
-    return failed
-
-
-def _ended(running: dict[Future[Result], Topic], pool: ThreadPoolExecutor) -> Iterator[Future[Result]]:
-    """The topics as they end; all are ended where one stops the run."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    beside, alone = ([topic for topic in topics if topic.alone == is_alone] for is_alone in (False, True))
     try:
-        yield from as_completed(running)
+        is_measured = [*_measure(beside, workers, work), *_measure(alone, 1, work)]
     except BaseException:
         STOP.set()
-        pool.shutdown(wait=False, cancel_futures=True)
         raise
+    return [topic.name for topic, is_right in zip([*beside, *alone], is_measured, strict=True) if not is_right]
+
+
+def _measure(topics: list[Topic], workers: int, work: Callable[[Topic], Result]) -> tuple[bool, ...]:
+    """Whether each was measured; so many run at once."""
+    tasks = []
+    for number, topic in enumerate(reversed(topics)):  # Dask begins with the last of the keys
+        tasks.append(dask.delayed(_is_measured)(work, topic, dask_key_name=f"{number:03}"))
+    with ProgressBar(dt=1.0):
+        found: tuple[bool, ...] = dask.compute(*reversed(tasks), scheduler="threads", num_workers=workers)
+    return found
+
+
+def _is_measured(work: Callable[[Topic], Result], topic: Topic) -> bool:
+    """Measure a topic, and print what it took or why it failed."""
+    try:
+        result = work(topic)
+    except TopicError as error:
+        click.echo(f"{topic.name}: {error}", err=True)
+        return False
+    click.echo(f"{topic.name}: {result.seconds:.0f} s, {result.processor_seconds:.0f} s of the processor")
+    return True
 
 
 def _names(_context: click.Context, _option: click.Parameter, text: str) -> list[Topic]:

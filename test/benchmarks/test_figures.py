@@ -333,6 +333,25 @@ def test_what_was_found_wrong_is_a_figure_too(
     assert measured(scripts, tmp_path, monkeypatch, f"{WRITES}; sys.exit(1)", judges=True).figures["n"] == {"n": 2}
 
 
+def test_topics_run_in_their_order_those_alone_last_and_a_failure_is_named(
+    scripts: dict[str, ModuleType], result: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [f"t{k}" for k in range(12)]
+    topics = [replace(one_topic(scripts, Path(name)), name=name, alone=name == "t0") for name in names]
+    begun: list[str] = []
+
+    def work(topic: Any) -> Any:
+        begun.append(topic.name)
+        if topic.name == "t5":
+            raise scripts["figure_run"].TopicError("expected an end")
+        return result
+
+    assert scripts["figures"].measure_all(topics, 1, work) == ["t5"]
+    assert begun == [*names[1:], "t0"]
+    said = capsys.readouterr()
+    assert "t5: expected an end" in said.err and "t11: 1 s, 1 s of the processor" in said.out
+
+
 def test_the_seeds_are_those_of_the_command(scripts: dict[str, ModuleType]) -> None:
     seeds_of = scripts["figure_run"].seeds_of
     assert seeds_of("x.py --seed 3 --simulate moved:1,2 --simulate loop:814:sensor=azure --rounds 5") == [3, 1, 2, 814]
