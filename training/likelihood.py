@@ -140,14 +140,14 @@ def reliability(rows: Rows, odds: Array) -> list[dict[str, float]]:
     table = []
     for least in THRESHOLDS:
         taken = accepted(rows, odds, least)
-        foretold = float((1.0 / (1.0 + prior * 10.0 ** odds[taken])).sum())
+        predicted = float((1.0 / (1.0 + prior * 10.0 ** odds[taken])).sum())
         table.append(
             {
                 "odds": least,
                 "accepted": int(taken.sum()),
                 "right": int((taken & right).sum()),
                 "false": int((taken & false).sum()),
-                "foretold": round(foretold, 1),
+                "predicted": round(predicted, 1),
                 "recall": round(float((taken & right).sum() / max(1, closable(rows))), 3),
             }
         )
@@ -163,11 +163,11 @@ def closable(rows: Rows) -> int:
 def show(table: Sequence[Mapping[str, float]], title: str) -> None:
     """Print a table of reliability."""
     click.echo(title)
-    click.echo("  odds  accepted   right   false  foretold  recall")
+    click.echo("  odds  accepted   right   false predicted  recall")
     for line in table:
         click.echo(
             f"{line['odds']:6.0f} {line['accepted']:9.0f} {line['right']:7.0f} {line['false']:7.0f} "
-            f"{line['foretold']:9.1f} {line['recall']:7.3f}"
+            f"{line['predicted']:9.1f} {line['recall']:7.3f}"
         )
 
 

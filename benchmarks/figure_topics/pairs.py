@@ -66,7 +66,7 @@ def _refused(raw: Any) -> Values:
 
 def _at(raw: Any, least: int) -> Values:
     row = next(row for row in raw if row["odds"] == least)
-    return {key: row[key] for key in ("accepted", "false", "foretold", "recall")}
+    return {key: row[key] for key in ("accepted", "false", "predicted", "recall")}
 
 
 TOPICS = (
@@ -149,7 +149,7 @@ TOPICS = (
             Row(
                 f"least_{least}",
                 f"accepted at odds of {least} and more",
-                "{accepted} accepted, {false} false, {foretold} predicted, {recall} of the right ones",
+                "{accepted} accepted, {false} false, {predicted} predicted, {recall} of the right ones",
                 partial(_at, least=least),
             )
             for least in (1, 10, 75)

@@ -85,7 +85,7 @@ def test_of_each_pair_the_first_is_accepted_that_is_likely_and_breaks_no_rule() 
 def test_the_false_ones_that_the_odds_foretell_are_those_that_come() -> None:
     found, unseen = fit(drawn_rows(1)), drawn_rows(2)
     for line in reliability(unseen, log_odds(found, unseen.readings))[:3]:
-        assert line["false"] == pytest.approx(line["foretold"], abs=3.0 + 0.5 * line["foretold"])
+        assert line["false"] == pytest.approx(line["predicted"], abs=3.0 + 0.5 * line["predicted"])
 
 
 def test_what_is_written_is_what_was_fitted() -> None:
