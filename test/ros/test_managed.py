@@ -87,8 +87,9 @@ def test_a_managed_detector_is_configured_lets_frames_in_while_active_and_ends_w
     assert {"active"} == {pair.value for pair in alone.status["/detector"].values if pair.key == "state"}
 
     assert change(alone, "detector", DEACTIVATE) and change(alone, "detector", CLEAN_UP)
-    topics = {topic for topic, _ in alone.node.get_publisher_names_and_types_by_node("detector", "/")}
     alone.wait_for(lambda: not alone.connected["/detector"], what="the detector to listen to nothing")
+    alone.wait_for(lambda: ("detector", "/") in alone.node.get_node_names_and_namespaces(), what="the detector's name")
+    topics = {topic for topic, _ in alone.node.get_publisher_names_and_types_by_node("detector", "/")}
     assert "/finished" in topics
     assert change(alone, "detector", CONFIGURE) and change(alone, "detector", ACTIVATE)
     alone.wait_for(lambda: bool(alone.connected["/detector"]), what="the detector to listen again")

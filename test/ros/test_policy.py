@@ -46,6 +46,11 @@ def open_nodes(graph: Graph, tiny_model: Path) -> Iterator[Graph]:
         lambda: {f"{SPACE}/{name}" for name in nodes} <= set(graph.counters), START_S, "the counters of all nodes"
     )
     graph.wait_for(lambda: all(is_active(graph, name) for name in nodes), START_S, "active nodes")
+    graph.wait_for(
+        lambda: {(name, SPACE) for name in nodes} <= set(graph.node.get_node_names_and_namespaces()),
+        START_S,
+        "the names of all nodes, which discovery may bring later than their topics",
+    )
     yield graph
     for name in nodes:
         graph.stop(name)
