@@ -92,7 +92,7 @@ def test_a_pipe_is_written_into(tmp_path: Path) -> None:
     reader = threading.Thread(target=lambda: received.append(pipe.read_text()))
     reader.start()
     write_whole(pipe, "written")
-    reader.join(5)
+    reader.join(60)
     assert received == ["written"] and names(tmp_path) == ["pipe"]
 
 
@@ -124,7 +124,7 @@ def test_what_is_made_elsewhere_is_written_into_a_pipe_which_stays_one(tmp_path:
     reader = threading.Thread(target=lambda: received.append(pipe.read_text()), daemon=True)
     reader.start()
     made(pipe)
-    reader.join(5)
+    reader.join(60)
     assert received == ["new"] and stat.S_ISFIFO(pipe.stat().st_mode) and names(tmp_path) == ["pipe"]
 
 

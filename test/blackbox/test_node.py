@@ -60,7 +60,7 @@ def refuse(node: BlackboxNode, reason: Reason, at_s: int) -> None:
 
 
 def wait(true: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while not true():
         assert time.monotonic() < deadline
         time.sleep(0.01)

@@ -31,7 +31,7 @@ def test_every_process_has_ended_when_the_block_is_left_by_an_error(tmp_path: Pa
 def test_a_failed_process_is_reported_with_its_last_words(tmp_path: Path, modules: dict[str, str]) -> None:
     with Processes(tmp_path / "logs", modules) as processes:
         processes.start("good", "sleeper", ())
-        processes.start("bad", "failure", ()).wait(20)
+        processes.start("bad", "failure", ()).wait(60)
         with pytest.raises(ValueError, match="bad ended with status 1; its last line: this went wrong"):
             processes.require_alive()
 
@@ -39,7 +39,7 @@ def test_a_failed_process_is_reported_with_its_last_words(tmp_path: Path, module
 def test_what_a_process_says_is_in_its_log(tmp_path: Path, modules: dict[str, str]) -> None:
     with Processes(tmp_path / "logs", modules) as processes:
         processes.start("a", "sleeper", ())
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + 60
         while "ready" not in processes.log("a").read_text() and time.monotonic() < deadline:
             time.sleep(0.05)
         processes.require_alive()

@@ -32,7 +32,7 @@ def fresh(domain: int, tmp_path: Path) -> Iterator[Graph]:
 def scraped(address: str) -> dict[tuple[str, str], float]:
     """The sum over other labels of each metric, by its name and node."""
     request = urllib.request.Request(address, headers={"Accept": ACCEPT})
-    with urllib.request.urlopen(request, timeout=20) as answer:
+    with urllib.request.urlopen(request, timeout=60) as answer:
         assert answer.headers["Content-Type"].startswith("application/openmetrics-text")
         families = list(text_string_to_metric_families(answer.read().decode()))
     found: dict[tuple[str, str], float] = {}

@@ -30,7 +30,7 @@ def fresh(domain: int, tmp_path: Path) -> Iterator[Graph]:
 
 
 def asked(address: str) -> Any:
-    with urllib.request.urlopen(address, timeout=20) as answer:
+    with urllib.request.urlopen(address, timeout=60) as answer:
         return answer.read()
 
 

@@ -334,7 +334,7 @@ def test_who_drains_does_not_wait_for_what_is_put_meanwhile() -> None:
     for thread in threads:
         thread.start()
         time.sleep(0.1)
-    in_time = drained.wait(3.0)
+    in_time = drained.wait(30.0)
     ended.set()
     for thread in threads:
         thread.join()

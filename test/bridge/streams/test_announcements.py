@@ -51,7 +51,7 @@ def received(node: Node, kind: type, topic: str, profile: Any) -> list[Any]:
 
 
 def wait_for(node: Node, *clusters: list[Any]) -> None:
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 60.0
     while not all(clusters) and time.monotonic() < deadline:
         rclpy.spin_once(node, timeout_sec=0.1)
 
@@ -76,7 +76,7 @@ def test_with_objreg_msgs_all_that_is_known_is_announced_under_the_name_of_the_n
     landmarks = received(node, closures_msg.ObjectLandmarks, "object_landmarks", qos.stage())
     announcements.closures([CLOSURE])
     closures = received(node, closures_msg.LoopClosureMsg, "loop_closures", qos.latched())  # it comes late
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 60.0
     while node.count_subscribers("closure_refusals") == 0 and time.monotonic() < deadline:
         time.sleep(0.05)
     announcements.refusals([REJECTED])

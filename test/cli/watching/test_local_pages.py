@@ -23,7 +23,7 @@ def port() -> Iterator[int]:
 
 
 def answer(port: int, path: str, method: str = "GET", **headers: str) -> http.client.HTTPResponse:
-    connection = http.client.HTTPConnection(HERE, port, timeout=20)
+    connection = http.client.HTTPConnection(HERE, port, timeout=60)
     connection.request(method, path, headers=headers)
     return connection.getresponse()
 
