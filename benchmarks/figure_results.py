@@ -17,7 +17,8 @@ from objreg_ros.whole_file import write_whole
 
 RESULTS = REPOSITORY / "benchmarks/results"
 CURRENT = RESULTS / "current"
-CODE = ("objreg_ros", "objreg_mapper", "objreg_tools", "models", "launch", "config")  # what figures depend on
+# What figures depend on, as git names paths.
+CODE = ("objreg_ros", "objreg_mapper", "objreg_tools", "models", "launch", "config", ":(exclude)*.md")
 
 
 @dataclass(frozen=True)
