@@ -91,13 +91,16 @@ def robust(graphs: int, seed: int, peers: list[str], pairwise: bool, json_file: 
 @click.option("--poses", default=40000, show_default=True, type=click.IntRange(100), help="Of odometry, 27 cm each.")
 @click.option("--closures", default=5000, show_default=True, type=click.IntRange(1), help="Right ones.")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(0))
+@click.option("--peers/--no-peers", "with_peers", default=True, help="Other optimisers at once on the same walk.")
 @JSON
-def scale(poses: int, closures: int, seed: int, json_file: Path | None) -> None:
+def scale(poses: int, closures: int, seed: int, with_peers: bool, json_file: Path | None) -> None:
     """A walk of kilometres."""
     walk = map_scale.long_walk(poses, closures, seed)
     click.echo(map_scale.HEAD)
     figures = map_scale.ours(walk)
     write(json_file, figures)
+    if not with_peers:
+        return
     figures["short"] = map_scale.at_once(map_scale.shortened(walk, map_scale.SHORT_M), list(PEERS))
     click.echo(map_scale.rows_at_once(figures["short"]))
     figures["whole"] = map_scale.at_once(walk, ["GTSAM LM"], with_ours=False)

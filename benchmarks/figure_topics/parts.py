@@ -139,7 +139,7 @@ TOPICS = (
     Topic(
         name="mapper_scale",
         title="The mapper over kilometres",
-        script="benchmarks/mapper.py scale --seed 1",
+        script="benchmarks/mapper.py scale --seed 1 --no-peers",
         quick="--poses 4000 --closures 200",
         whole="",
         minutes=(0.8, 40),
