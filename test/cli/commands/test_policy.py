@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections import defaultdict
 from fnmatch import fnmatchcase
@@ -145,6 +146,19 @@ def test_writing_needs_a_checkout(tmp_path: Path) -> None:
 def test_the_pages_name_policies_that_are_there(repository: Path, written: str, name: str) -> None:
     named = re.findall(r"config/sros2/[\w.]+", (repository / written).read_text())
     assert named and all((repository / path).exists() for path in named), name
+
+
+def test_the_page_remaps_for_a_policy_all_that_its_launch_line_remaps(repository: Path) -> None:
+    page = (repository / "docs/security.md").read_text()
+    launch = ast.parse((repository / "launch/objreg.launch.py").read_text())
+    (remapped,) = (
+        ast.literal_eval(node.value)
+        for node in launch.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "REMAPPED"
+    )
+    given = dict(re.findall(r" (\w+):=(/kinect\S*)", page.split("ros2 launch", 1)[1].split("\n", 1)[0]))
+    opened = {topic: given[name] + added for topic, (name, added) in remapped.items() if name in given}
+    assert len(given) == 2 and dict(re.findall(r"--remap (\S+):=(\S+)", page)) == opened
 
 
 @pytest.fixture
