@@ -142,7 +142,7 @@ TOPICS = (
         script="benchmarks/mapper.py scale --seed 1 --no-peers",
         quick="--poses 4000 --closures 200",
         whole="",
-        minutes=(0.8, 40),
+        minutes=(0.8, 50),
         rows=(
             Row(
                 "closure",
